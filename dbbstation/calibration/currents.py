@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import average_of
 from dbbstation.computing.compiled import in_parallel
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.harmonics import Noise, noise_of
@@ -157,7 +159,7 @@ def _of_motor(name: str, labels: Sequence[str], current: Sequence[Floats]) -> li
     every = np.concatenate([values[np.isfinite(values)] for values in current])
     for limit in _limits(every):
         notes.append(
-            f"{name}: its current stops at {limit:g} A, in {100.0 * float(np.mean(every == limit)):.1f} % of the "
+            f"{name}: its current stops at {limit:g} A, in {100.0 * average_of(every == limit):.1f} % of the "
             "readings: the channel saturates; these readings are left out"
         )
         for values in current:
@@ -402,7 +404,7 @@ def motor_findings(
 
 
 def _rms(parts: Sequence[Floats]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else np.nan
+    return sqrt(np.mean(np.concatenate(parts) ** 2)) if parts else np.nan
 
 
 def _drives(layout: Layout) -> set[str]:
@@ -424,7 +426,7 @@ def _centre_of_gravity(
         for parameter, column in zip(term.parameters, np.r_[term.columns].tolist(), strict=True):
             told = column in place and held[column] <= OPEN
             k = place.get(column, 0)
-            sigma = float(np.sqrt(solution.variance[k]))
+            sigma = sqrt(solution.variance[k])
             said[channel][parameter.name] = (float(solution.x[k]), sigma) if told else None
     return said
 

@@ -11,6 +11,7 @@ import numpy as np
 from dbbstation.circles.noise import noise_of
 from dbbstation.circles.path import CirclePath, Filter, both, path_of
 from dbbstation.circles.reversals import AXES_DEG, closure_of, harmonics_of, step_at
+from dbbstation.computing.arrays import place_of_largest, range_of
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.trace.analysis import figures, passes_of
@@ -129,7 +130,7 @@ def _of_path(path: CirclePath, radius_error_um: float) -> dict[str, Any]:
     deviation_mm = path.least_squares.deviation_mm
     return {
         "path": path,
-        "g_least_squares_um": 1e3 * float(np.ptp(deviation_mm)),
+        "g_least_squares_um": 1e3 * range_of(deviation_mm),
         "f_centred": _extremes(radius_error_um + 1e3 * deviation_mm),
         "f_commanded": _extremes(1e3 * (path.about_ball_mm - path.radius_mm)),
     }
@@ -193,13 +194,13 @@ def analyse_pair(one: CircleAnalysis, other: CircleAnalysis) -> PairAnalysis:
         for path in (one.path, other.path)
     ]
     apart = 1e3 * np.abs(radii[0] - radii[1])
-    widest = int(np.argmax(apart))
+    widest = place_of_largest(apart)
     return PairAnalysis(
         one=one,
         other=other,
         together=together,
         g_um=1e3 * together.zone().width_mm,
-        g_least_squares_um=1e3 * float(np.ptp(together.least_squares.deviation_mm)),
+        g_least_squares_um=1e3 * range_of(together.least_squares.deviation_mm),
         d_um=1e3 * (together.least_squares.radius_mm - together.radius_mm),
         h_um=float(apart[widest]),
         h_deg=float(theta_deg[widest]),

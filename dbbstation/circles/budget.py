@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from math import sqrt
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from dbbstation.circles.estimates import ABSOLUTE, FIRST, BudgetQuantity, estimate_of, pair_estimate, slow_noise_um
 from dbbstation.circles.noise import FEWEST_SAMPLES, ROUNDING
+from dbbstation.computing.arrays import hypot_of
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.facts.serialise import Kept, OrNull
 from dbbstation.inference.harmonics import SAMPLES_PER_HARMONIC, coefficients
@@ -81,7 +83,7 @@ class Budget:
     @property
     def known_um(self) -> float:
         """Return the root sum of squares of known terms [µm]."""
-        return float(np.sqrt(sum(term**2 for term in self.terms_um.values())))
+        return sqrt(sum(term**2 for term in self.terms_um.values()))
 
 
 def _budget(
@@ -164,13 +166,13 @@ def _range(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge)
     if found is None:
         read = _as_read(one)[quantity]
         return _budget(quantity, terms, missing, read, read, why)
-    terms[BudgetTerm.NOISE] = float(np.hypot(found.u_um, terms.get(BudgetTerm.NOISE, 0.0)))
+    terms[BudgetTerm.NOISE] = hypot_of(found.u_um, terms.get(BudgetTerm.NOISE, 0.0))
     return _budget(quantity, terms, missing, found.value_um, found.as_read_um, why)
 
 
 def _of_extremes(one: CircleAnalysis, extremes: int) -> dict[BudgetTerm, float]:
     along = one.raw.circle.bar_mm / one.raw.circle.radius_mm
-    root = float(np.sqrt(extremes))
+    root = sqrt(extremes)
     return {
         BudgetTerm.RESOLUTION: root * along * one.noise.resolution_um / ROUNDING,
         BudgetTerm.CLOSURE: root * _closure_um(one) / ROUNDING,
@@ -214,7 +216,7 @@ def _with_form(budget: Budget, known: SetUpKnowledge) -> Budget:
 def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[BudgetQuantity, Budget]:
     """Return the budgets of G(b), D and H of a circle in both directions on one mounting."""
     radius = [budget_of(one, BudgetQuantity.RADIUS, known) for one in (pair.one, pair.other)]
-    noise = float(np.hypot(radius[0].terms_um[BudgetTerm.NOISE], radius[1].terms_um[BudgetTerm.NOISE])) / 2.0
+    noise = hypot_of(radius[0].terms_um[BudgetTerm.NOISE], radius[1].terms_um[BudgetTerm.NOISE]) / 2.0
     shared: dict[BudgetTerm, float] = {
         cause: size for cause, size in radius[0].terms_um.items() if cause is not BudgetTerm.NOISE
     }
@@ -230,9 +232,9 @@ def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[BudgetQuanti
 
 def _pair_range(pair: PairAnalysis, quantity: BudgetQuantity) -> Budget:
     each = [_of_extremes(one, 2) for one in (pair.one, pair.other)]
-    turned = float(np.hypot(pair.one.raw.start_uncertainty_deg, pair.other.raw.start_uncertainty_deg))
+    turned = hypot_of(pair.one.raw.start_uncertainty_deg, pair.other.raw.start_uncertainty_deg)
     terms = {
-        cause: float(np.sqrt(np.mean([terms[cause] ** 2 for terms in each])))
+        cause: sqrt(np.mean([terms[cause] ** 2 for terms in each]))
         for cause in (BudgetTerm.RESOLUTION, BudgetTerm.CLOSURE)
     }
     terms[BudgetTerm.ANGLE] = _slope_um_per_deg(pair) * turned
@@ -276,12 +278,12 @@ def _closure_um(one: CircleAnalysis) -> float:
         drift, u = one.closure.height_um, one.closure.u_um
     else:
         return 0.0
-    return float(np.sqrt(max(drift**2 - u**2, 0.0)))
+    return sqrt(max(drift**2 - u**2, 0.0))
 
 
 def _slope_um_per_deg(pair: PairAnalysis) -> float:
     squares = [
-        (1e3 * float(np.hypot(*one.centre_mm))) ** 2 + sum((h.undulations * h.amplitude_um) ** 2 for h in one.harmonics)
+        (1e3 * hypot_of(*one.centre_mm)) ** 2 + sum((h.undulations * h.amplitude_um) ** 2 for h in one.harmonics)
         for one in (pair.one, pair.other)
     ]
     return float(np.radians(np.sqrt(np.mean(squares) / 2.0)))
@@ -316,5 +318,5 @@ def spectrum_of(one: CircleAnalysis) -> FormSpectrum:
         return FormSpectrum(np.arange(0), np.zeros(0), float("nan"))
     found = coefficients(one.residual_um, np.radians(one.raw.theta_deg), highest)
     amplitude = np.sqrt(2.0 / count) * np.hypot(found[1 : highest + 1], found[highest + 1 :])
-    noise_um = 2.0 * one.noise.slow_um / float(np.sqrt(count))
+    noise_um = 2.0 * one.noise.slow_um / sqrt(count)
     return FormSpectrum(np.arange(FIRST, highest + 1), amplitude[FIRST - 1 :], noise_um)

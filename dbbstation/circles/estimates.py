@@ -21,6 +21,7 @@ from dbbstation.circles.extremes import (
 from dbbstation.circles.form import form_and_noise
 from dbbstation.circles.path import path_of
 from dbbstation.circles.strip import strip_widths
+from dbbstation.computing.arrays import hypot_of
 from dbbstation.computing.kept import once_for_each
 from dbbstation.plan.plan import FULL_TURN_DEG
 
@@ -68,7 +69,7 @@ def slow_noise_um(one: CircleAnalysis, undulations: int) -> float:
     """
     if not one.noise.known:
         return one.noise.sigma_um
-    return float(np.hypot(np.sqrt(_apart(one).continued.mean[undulations]), one.noise.least_um))
+    return hypot_of(np.sqrt(_apart(one).continued.mean[undulations]), one.noise.least_um)
 
 
 @once_for_each

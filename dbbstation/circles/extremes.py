@@ -10,6 +10,7 @@ interval starts at zero if noise alone suffices.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,7 @@ from scipy.fft import next_fast_len
 from scipy.special import chndtr, chndtrinc
 
 from dbbstation.circles.form import drawn_lines
+from dbbstation.computing.arrays import average_of, sum_of
 from dbbstation.computing.compiled import compiled
 from dbbstation.plan.plan import FULL_TURN_DEG
 
@@ -134,7 +136,7 @@ def drawn_paths(
                 highest_um=each[0],
                 lowest_um=each[1],
                 theta_deg=middle_deg,
-                sigma_um=float(np.sqrt((2.0 * power.sum() - power[0]) / count)),
+                sigma_um=sqrt((2.0 * power.sum() - power[0]) / count),
                 least=_least_share(apart.power_um2, left_passed),
                 order=order,
                 starts=starts,
@@ -195,9 +197,9 @@ def _means(values: Floats, order: Integers, starts: Integers) -> Floats:
 
 
 def _least_share(power_um2: Floats, passed: Floats) -> float:
-    end = float(np.mean(power_um2[-max(len(power_um2) // 3, 1) :]))
-    whole = float(np.sum(power_um2 * passed**2))
-    return float(np.sqrt(np.sum(np.minimum(power_um2, end) * passed**2) / whole)) if whole > 0.0 else 1.0
+    end = average_of(power_um2[-max(len(power_um2) // 3, 1) :])
+    whole = sum_of(power_um2 * passed**2)
+    return sqrt(np.sum(np.minimum(power_um2, end) * passed**2) / whole) if whole > 0.0 else 1.0
 
 
 PASSED = 0.1
@@ -333,12 +335,12 @@ def without_noise(length: float, u: float) -> tuple[float, float]:
     # sec. 3.10]. Inverting the percentiles 2.5 and 97.5 gives the 95 % interval [confidence interval by inversion of a
     # test, Casella and Berger, Statistical Inference, 9.2.1]. The uncertainty is its longer side over 1.96, at least u.
     if not u > 0.0 or length > LONG * u:
-        return float(np.sqrt(length**2 - u**2)), u
+        return sqrt(length**2 - u**2), u
     square = (length / u) ** 2
 
     def shows(share: float) -> float:
         """Return the true length, in u, that is measured shorter than `length` with probability `share`."""
-        return float(np.sqrt(chndtrinc(square, AXES, share))) if chndtr(square, AXES, 0.0) > share else 0.0
+        return sqrt(chndtrinc(square, AXES, share)) if chndtr(square, AXES, 0.0) > share else 0.0
 
     low, value, high = (shows(share) for share in (0.975, 0.5, 0.025))
     return u * value, u * max(value - low, high - value, QUANTILE) / QUANTILE

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.circles.continued import continued_noise
 from dbbstation.circles.pushes import NO_TAILS, pushes_of
+from dbbstation.computing.arrays import average_of, median_of, place_of_largest
 from dbbstation.inference.harmonics import bands
 
 if TYPE_CHECKING:
@@ -64,7 +66,7 @@ def form_and_noise(deviation_um: Floats) -> FormAndNoise:
     share[0] = 1.0  # the radius has less noise than a sample, so the mean counts as form
     share[low + 1 :] *= standing
     if low > 1 and not (share[2:].any() or sharp.any()):
-        strongest = 2 + int(np.argmax(power[2 : low + 1] / np.maximum(noise[2 : low + 1], np.finfo(float).tiny)))
+        strongest = 2 + place_of_largest(power[2 : low + 1] / np.maximum(noise[2 : low + 1], np.finfo(float).tiny))
         share[strongest] = 1.0  # without outstanding lines, the strongest is most probably form
     white = np.where(share > 0.0, 0.0, lines / np.sqrt(count * np.maximum(noise, np.finfo(float).tiny)))
     white[: low + 1] = 0.0
@@ -86,8 +88,8 @@ def _sharp(quick_um: Floats, low: int) -> Floats:
         np.fft.irfft(np.fft.rfft(values) * passed, count)
         for values in (quick_um, np.median([np.roll(quick_um, 1), quick_um, np.roll(quick_um, -1)], axis=0))
     )
-    usual = float(np.median(np.abs(beside))) / MEDIAN_OF_NORMAL
-    out = np.abs(beside) > usual * float(np.sqrt(2.0 * np.log(8.0 * low / CHANCE)))
+    usual = median_of(np.abs(beside)) / MEDIAN_OF_NORMAL
+    out = np.abs(beside) > usual * sqrt(2.0 * np.log(8.0 * low / CHANCE))
     if not out.any():
         return np.zeros(count)
     reach = max(count // (4 * low), 1)
@@ -121,7 +123,7 @@ def _averaged(power: Floats) -> Floats:
     window = np.ones(min(2 * NEIGHBOURS + 1, len(power)))
     total = np.convolve(np.where(known, power, 0.0), window, mode="same")
     of = np.convolve(known.astype(float), window, mode="same")
-    everywhere = float(np.mean(power[known])) if known.any() else 0.0
+    everywhere = average_of(power[known]) if known.any() else 0.0
     return np.where(of > 0.0, total / np.maximum(of, 1.0), everywhere)
 
 

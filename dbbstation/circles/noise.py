@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import hypot_of, sum_of
 from dbbstation.inference.harmonics import bands, coefficients, noise_spectrum
 from dbbstation.trace.cut import SMALLEST_SHAPE_MM
 
@@ -17,7 +19,7 @@ FEWEST_SAMPLES = 100
 """Fewest samples of a turn whose spectrum separates noise from form."""
 
 
-ROUNDING = float(np.sqrt(12.0))
+ROUNDING = sqrt(12.0)
 """Step of rounded readings over the standard deviation of rounding [GUM 4.3.7]."""
 
 LEAST_UM = 1e3 * SMALLEST_SHAPE_MM / ROUNDING
@@ -53,7 +55,7 @@ class CircleNoise:
     @property
     def sigma_um(self) -> float:
         """Return the noise's standard deviation for tests [µm]."""
-        return float(np.hypot(np.nan_to_num(self.slow_um), self.least_um))
+        return hypot_of(np.nan_to_num(self.slow_um), self.least_um)
 
 
 def noise_of(deviation_um: Floats, phi_deg: Floats, reading_mm: Floats) -> CircleNoise:
@@ -74,10 +76,10 @@ def noise_of(deviation_um: Floats, phi_deg: Floats, reading_mm: Floats) -> Circl
     spectrum = noise_spectrum((square[:high] + square[high:])[low:], low, 2.0)
     lines = np.abs(np.fft.rfft(deviation_um)[low + 1 :]) ** 2 / len(deviation_um)
     # A line's power is exponentially distributed: two degrees of freedom, mean square twice the squared mean.
-    known = 4.0 * float(lines.sum()) ** 2 / max(float(np.sum(lines**2)), np.finfo(float).tiny)
+    known = 4.0 * float(lines.sum()) ** 2 / max(sum_of(lines**2), np.finfo(float).tiny)
     return CircleNoise(
-        slow_um=float(np.sqrt(spectrum.power[0])),
-        reading_um=float(np.sqrt(np.mean(lines))),
+        slow_um=sqrt(spectrum.power[0]),
+        reading_um=sqrt(np.mean(lines)),
         resolution_um=resolution_um,
         freedom=spectrum.freedom,
         reading_freedom=max(known, 1.0),

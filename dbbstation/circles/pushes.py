@@ -8,11 +8,13 @@ error, and 720 samples give 2.6 instead of 6.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import gamma, gammaln
 
+from dbbstation.computing.arrays import average_of
 from dbbstation.inference.uneven import TAILS, student_likelihood
 
 if TYPE_CHECKING:
@@ -79,13 +81,13 @@ NO_TAILS = Pushes(_NORMAL_ALONE)
 def pushes_of(white: NDArray[np.complex128], count: int) -> Pushes:
     """Estimate the innovations' distribution from noise lines."""
     pushes = np.fft.irfft(white, count)
-    square = float(np.mean(pushes**2))
+    square = average_of(pushes**2)
     if not square > 0.0:
         return NO_TAILS
     scaled = pushes / np.sqrt(square)
-    excess = float(np.mean(scaled**4)) - 3.0
+    excess = average_of(scaled**4) - 3.0
     # The standard error of a normal kurtosis is sqrt(24 / n) [Kendall and Stuart, The Advanced Theory of Statistics, vol. 1, ch. 12].
-    if excess < -SHORTER * float(np.sqrt(24.0 / count)):
+    if excess < -SHORTER * sqrt(24.0 / count):
         # Removed lines make the series more normal: its fourth cumulant scales with the square of the remaining share.
         there = float(np.count_nonzero(white)) / len(white)
         return Pushes(_NORMAL_ALONE, excess / there**2)

@@ -6,6 +6,7 @@ On a hexapod they are symptoms, not causes.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.linalg import block_diag
 
 from dbbstation.circles.noise import LEAST_UM
 from dbbstation.circles.signatures import Signature, SignatureColumn, cyclic_shapes, shapes_of
+from dbbstation.computing.arrays import average_of, hypot_of
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.facts.serialise import OrNull
 from dbbstation.inference.harmonics import LOW, basis, misfit
@@ -226,9 +228,9 @@ def _sigma_um(turns: Sequence[_Turn], fit: _Fit) -> float:
         # The test itself subtracts each turn's radius and centre.
         freedom_used=float(fit.basis.shape[1] - 2 * len(turns)),
     )
-    per_undulation = float(np.mean([len(turn.theta_deg) for turn in turns])) / (2.0 * LOW)
-    rounding = float(np.mean([turn.one.noise.resolution_um**2 / 12.0 for turn in turns]))
-    return float(np.sqrt(max(found.noise**2, rounding, LEAST_UM**2) + found.rms**2 * max(per_undulation, 1.0)))
+    per_undulation = average_of([len(turn.theta_deg) for turn in turns]) / (2.0 * LOW)
+    rounding = average_of([turn.one.noise.resolution_um**2 / 12.0 for turn in turns])
+    return sqrt(max(found.noise**2, rounding, LEAST_UM**2) + found.rms**2 * max(per_undulation, 1.0))
 
 
 def _symptoms(fits: Sequence[_Fit], sigma_um: float, *, both: bool) -> list[Symptom]:
@@ -281,10 +283,10 @@ def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
     gained, size, waves, beside = found.gained, found.size, found.waves, found.beside
     sigma_um = _sigma_um(turns, replace(fit, left_um=fit.left_um - beside @ size))
     covariance = sigma_um**2 * np.linalg.inv(beside.T @ beside)
-    amplitude = float(np.hypot(*size))
+    amplitude = hypot_of(*size)
     along = size / max(amplitude, np.finfo(float).tiny)
     across = np.array([-along[1], along[0]])
-    u = float(np.sqrt(along @ covariance @ along))
+    u = sqrt(along @ covariance @ along)
     # Half of the reduction of squares is exponentially distributed in each trial [two degrees of freedom].
     limit = 2.0 * float(np.log(2 * len(PERIODS) / CHANCE)) * sigma_um**2
     if gained <= limit:
@@ -293,7 +295,7 @@ def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
         symptom = Symptom(Signature.CYCLIC, axis, None, None, below, "µm", seen=False, text=f"below {below:.2g} µm")
         return _Wave(symptom, waves, gained)
     # Noise perpendicular to a wave's phasor lengthens it by variance over twice its size.
-    size_um = float(np.sqrt(max(amplitude**2 - across @ covariance @ across, 0.0)))
+    size_um = sqrt(max(amplitude**2 - across @ covariance @ across, 0.0))
     symptom = Symptom(Signature.CYCLIC, axis, size_um, u, None, "µm", seen=True, text=f"every {found.period_mm:.1f} mm")
     return _Wave(symptom, waves, gained)
 
@@ -308,4 +310,4 @@ class _Trial:
 
 
 def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    return sqrt(np.mean(values**2))

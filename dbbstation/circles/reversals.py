@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import hypot_of, sum_of
 from dbbstation.inference.harmonics import amplitudes
 from dbbstation.plan.plan import FULL_TURN_DEG
 
@@ -68,7 +70,7 @@ def step_at(raw: RawCircle, deviation_um: Floats, theta_deg: float, sigma_um: fl
     if any(end is None for end in ends):
         return None
     (before, u_before), (behind, u_behind) = (end for end in ends if end is not None)
-    return ReversalStep(theta_deg, behind - before, float(np.hypot(u_before, u_behind)))
+    return ReversalStep(theta_deg, behind - before, hypot_of(u_before, u_behind))
 
 
 def closure_of(raw: RawCircle, deviation_um: Floats, sigma_um: float) -> ReversalStep | None:
@@ -77,7 +79,7 @@ def closure_of(raw: RawCircle, deviation_um: Floats, sigma_um: float) -> Reversa
     end = _line_at(raw.phi_deg - FULL_TURN_DEG, deviation_um, -1.0, sigma_um, near_deg=0.0)
     if beginning is None or end is None:
         return None
-    return ReversalStep(raw.circle.start_deg, end[0] - beginning[0], float(np.hypot(beginning[1], end[1])))
+    return ReversalStep(raw.circle.start_deg, end[0] - beginning[0], hypot_of(beginning[1], end[1]))
 
 
 def _line_at(
@@ -93,9 +95,9 @@ def _line_at(
         return None
     x = away_deg[inside]
     middle = x.mean()
-    spread = float(np.sum((x - middle) ** 2))
+    spread = sum_of((x - middle) ** 2)
     weight = 1.0 / len(x) - middle * (x - middle) / spread
-    return float(weight @ values[inside]), sigma * float(np.sqrt(weight @ weight))
+    return float(weight @ values[inside]), sigma * sqrt(weight @ weight)
 
 
 def harmonics_of(path: CirclePath) -> tuple[Harmonic, ...]:
@@ -105,7 +107,7 @@ def harmonics_of(path: CirclePath) -> tuple[Harmonic, ...]:
     cosine, sine = found.real[1:], -found.imag[1:]
     peaks = np.mod(np.degrees(np.arctan2(sine, cosine)) / orders, FULL_TURN_DEG / orders)
     return tuple(
-        Harmonic(int(k), float(np.hypot(c, s)), float(peak))
+        Harmonic(int(k), hypot_of(c, s), float(peak))
         for k, c, s, peak in zip(orders, cosine, sine, peaks, strict=True)
         if k > 1
     )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import largest_size, place_of_largest
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import forward, strut_lengths
@@ -88,7 +89,7 @@ class RootSearch:
         self.at = np.where(open_, np.where(held, self._between(width), outwards), self.at)
         away = np.abs(self.at - self._guess) > MOST_MM
         if away.any() or self._steps > MOST_STEPS:
-            self.done, self.lost = True, 1 + int(np.argmax(away if away.any() else open_))
+            self.done, self.lost = True, 1 + place_of_largest(away if away.any() else open_)
 
     def _between(self, width: Floats) -> Floats:
         """Return alternately the middle, limited by |f|, and the false position."""
@@ -254,7 +255,7 @@ class _Stretch:
                 reached = self._driven_to(wanted - sum(built_up) + built_up[k], slice(None), self._target)
                 built_up[k] = fitted.source.undone(motion, reached, self._machine, fitted.values, state)
             driven = wanted - sum(built_up)
-            change = float(np.abs(driven - last).max())
+            change = largest_size(driven - last)
             if change < AGREED_MM:
                 break
             motion, last = self._driven_to(driven, slice(None), self._near), driven
@@ -310,10 +311,10 @@ class _Stretch:
         for _ in range(TRIES):
             lacking, states = self._lacking(rows, driven)
             missed = np.abs(lacking).max(axis=1) > MET_MM
-            met = int(np.argmax(missed)) if missed.any() else len(missed)
+            met = place_of_largest(missed) if missed.any() else len(missed)
             if met == len(missed):
                 break
-            before, (first, short_mm) = (first, short_mm), (met, float(np.abs(lacking[met]).max()))
+            before, (first, short_mm) = (first, short_mm), (met, largest_size(lacking[met]))
             if first == before[0] and short_mm > GETS_ON * before[1]:
                 break
             last = driven

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import hypot_of
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS, Frames
 from dbbstation.model.identified import IdentifiedModel
@@ -86,7 +87,7 @@ def expected_circle(
         local_um=local,
         moving=frozenset(moving),
         again_um2=again,
-        place_um=1e3 * float(np.hypot(mounting_mm, observation.setup.ball_uncertainty_mm)),
+        place_um=1e3 * hypot_of(mounting_mm, observation.setup.ball_uncertainty_mm),
     )
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dbbstation.computing.arrays import place_of_largest
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import KinematicsError
 from dbbstation.facts.value import finite
@@ -134,7 +136,7 @@ def range_uncertainty_mm(identified: IdentifiedModel, motion: Motion, axis: int)
     """
     actual = identified.model.of_the_machine().actual_poses(motion)
     off = actual[:, axis] - motion.poses[motion.kept][:, axis]
-    ends = motion.poses[motion.kept][[int(np.argmax(off)), int(np.argmin(off))]]
+    ends = motion.poses[motion.kept][[place_of_largest(off), int(np.argmin(off))]]
     # Each extreme pose is half the range from their mean.
     half = position_uncertainty_mm(identified, Motion(ends), about_mean=True)[0, axis]
     return None if np.isnan(half) else 2.0 * float(half)
@@ -249,4 +251,4 @@ def pose_errors(commanded: Floats, actual: Floats, uncertainty_mm: Floats) -> Po
 
 def rms_length(vectors: Floats) -> float:
     """Return the rms length of vectors, shape (n, 3), in their unit."""
-    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))
+    return sqrt(np.mean(np.sum(vectors**2, axis=1)))

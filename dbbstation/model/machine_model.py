@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import place_of_largest
 from dbbstation.errors import KinematicsError
 from dbbstation.machine.geometry import STRUTS, Frames
 from dbbstation.machine.kinematics import (
@@ -127,7 +128,7 @@ class MachineModel:
             there = reached(firm + bent, there.frames)
         raise KinematicsError(
             "the machine finds no equilibrium under its weights",
-            where=f"pose {int(np.argmax(change)) + 1}",
+            where=f"pose {place_of_largest(change) + 1}",
             remedy="check the masses and compliances of the machine file and of the model, and the commanded pose",
         )
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import logsumexp
 
+from dbbstation.computing.arrays import place_of_largest
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, undecided
 from dbbstation.quality.forms import Forms, form_of
 from dbbstation.quality.knowledge import COEFFICIENTS, HIGHEST_HARMONIC
@@ -115,7 +116,7 @@ def programs_of_all(runs: Sequence[Seen], forms: AllForms | None = None) -> Find
     tried = np.concatenate([kept.logarithms[1 : len(KEEPING) + 1], turned.logarithms])
     # All ways have equal prior probability.
     value = float(logsumexp(tried) - np.log(len(tried)) - kept.logarithms[0])
-    best = int(np.argmax(tried))
+    best = place_of_largest(tried)
     way = (*KEEPING, *REVERSING)[best]
     limit = -float(np.log(PROBABILITY))
     stated = f"all {len(pairs)} runs together"

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import norm_of
 from dbbstation.quality.beside import SIZES, NearAssignments, Readings, mean_of
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
 from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
@@ -294,7 +295,7 @@ class Assigned:
         off = read_um(one) - expected_um(self.circles[label])
         session = self.effects.of_session[label]
         covariance = self.effects.own[label] + one.u_um**2 * np.eye(COEFFICIENTS) + 2.0 * session @ session.T
-        value, limit = float(np.linalg.norm(off)), limit_along(covariance, off)
+        value, limit = norm_of(off), limit_along(covariance, off)
         since = f"{self.reference.measured.day} {self.reference.measured:%B}"
         verdict = FindingVerdict.GOOD if value <= limit else FindingVerdict.CANNOT_TELL
         word = "as" if value <= limit else "changed since"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import hypot_of, median_of, norm_of
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.knowledge import ACROSS, COEFFICIENTS, Others, Seen, across
 from dbbstation.quality.limits import FEWEST_OTHERS, SCATTERING, length_limit, length_quantile, median_length, quantile
@@ -32,7 +34,7 @@ def direction(one: Seen, others: Others, expected: Expected | None = None) -> Fi
         why = "no other run of this test, and the expected centre does not lie off the axis through the start"
         return undecided(Name.DIRECTION, f"cannot be seen: {why}")
     off, mirrored = across(one) - across(against), across(one) + across(against)
-    apart, mirror = float(np.linalg.norm(off)), float(np.linalg.norm(mirrored))
+    apart, mirror = norm_of(off), norm_of(mirrored)
     stated = f"off the axis through the start it is {apart:.1f} µm from run {against.run.label}, {mirror:.1f} µm from its mirror image"
     limits = _across_limits(one, against, others, off, mirrored)
     if limits is None:
@@ -55,7 +57,7 @@ def _across_limits(
     stated = None if covariance is None else [limit_along(covariance[rows], each) for each in (off, mirrored)]
     if len(others.across_um) < FEWEST_OTHERS:
         return None if stated is None else (stated[0], stated[1])
-    by_noise = length_quantile(len(off)) * float(np.sqrt(unseen_um2(one, against)))
+    by_noise = length_quantile(len(off)) * sqrt(unseen_um2(one, against))
     limit = max(by_noise, length_limit(others.across_um, len(off)))
     if stated is None or covariance is None:
         return limit, limit
@@ -69,7 +71,7 @@ def _by_place(one: Seen, expected: Expected | None) -> Finding | None:
     start = np.radians(one.run.circle.start_deg)
     across = np.array([-np.sin(start), np.cos(start)])
     should = 1e3 * float(across @ expected.centre_mm)
-    u = 1e3 * float(np.sqrt(across @ expected.covariance_mm2[:2, :2] @ across))
+    u = 1e3 * sqrt(across @ expected.covariance_mm2[:2, :2] @ across)
     is_um = 1e3 * float(across @ np.array(one.analysis.centre_mm))
     limit = quantile(np.inf) * u
     if abs(is_um + should) <= limit and abs(is_um - should) <= limit:
@@ -105,7 +107,7 @@ def _beside(
     # it, and raises it if it exceeds stated uncertainties. The limit is at least the limit by noise and plan, and at
     # most the largest stated allowance.
     off = one.coefficients_um - other.coefficients_um
-    value = float(np.linalg.norm(off))
+    value = norm_of(off)
     stated = f"{value:.1f} µm rms from run {other.run.label} in mean, centre, ellipse and triangle"
     covariance = covariance_apart(one, other)
     if len(usual) < FEWEST_OTHERS:
@@ -116,15 +118,13 @@ def _beside(
         wrong = f"{stated}, at most {limit:.1f} µm by what machine and plan state: something moved between both; run both again"
         return found(name, value, limit, stated, wrong)
     lengths = [apart for apart, _ in usual]
-    limit = max(
-        length_quantile(COEFFICIENTS) * float(np.sqrt(unseen_um2(one, other))), length_limit(lengths, SCATTERING)
-    )
-    limit = float(np.hypot(limit, quantile(np.inf) * drifted_um(one, other)))
+    limit = max(length_quantile(COEFFICIENTS) * sqrt(unseen_um2(one, other)), length_limit(lengths, SCATTERING))
+    limit = hypot_of(limit, quantile(np.inf) * drifted_um(one, other))
     if one.run.mounting != other.run.mounting and one.run.expected is not None:
         # A shift d changes two coefficients by d / sqrt 2 each, and both mountings scatter.
-        limit = float(np.hypot(limit, length_quantile(2) * 1e3 * one.run.expected.mounting_mm))
+        limit = hypot_of(limit, length_quantile(2) * 1e3 * one.run.expected.mounting_mm)
     if covariance is not None:
-        more = max(float(np.median(sigmas)) / median_length(COEFFICIENTS), 1.0) if sigmas else 1.0
+        more = max(median_of(sigmas) / median_length(COEFFICIENTS), 1.0) if sigmas else 1.0
         limit = min(limit, more * limit_along(covariance, off), limit_of_length(covariance))
     wrong = f"{stated}, {np.median(lengths):.1f} µm usual in this session: something moved between both; run both again"
     return found(name, value, limit, stated, wrong)

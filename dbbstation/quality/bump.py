@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import place_of_largest
 from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.quality.finding import Finding, Name, found
 from dbbstation.quality.limits import ROBUST_SHARE, largest_of, scale_of
@@ -105,4 +106,4 @@ def _peaks(one: CircleAnalysis, rest: Floats, near: Integers, width_deg: float) 
 
 def largest_at(means: Floats, among: Integers) -> int:
     """Return which of the indices `among`, shape (k,), has the value of largest size."""
-    return int(among[int(np.argmax(np.abs(means[among])))])
+    return int(among[place_of_largest(np.abs(means[among]))])

@@ -7,7 +7,7 @@ in both runs.
 
 from __future__ import annotations
 
-from math import ceil, log
+from math import ceil, log, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -76,7 +76,7 @@ def _chance(analysis: CircleAnalysis) -> float:
     differs = np.abs(np.diff(analysis.raw.length_mm))
     step_mm = float(np.quantile(differs[differs > 0.0], ROUGHLY))
     # With few samples, second differences contain the form.
-    known = max(1.0 - quantile(np.inf) / float(np.sqrt(2.0 * noise.reading_freedom)), 0.0)
+    known = max(1.0 - quantile(np.inf) / sqrt(2.0 * noise.reading_freedom), 0.0)
     by_turn = chance_equal(squares_mm2, count, step_mm)
     return max(by_turn, chance_of((1e-3 * known * noise.reading_um) ** 2, step_mm))
 

@@ -9,6 +9,7 @@ for Machine Learning (2006), section 5.4.2].
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -137,7 +138,7 @@ class Forms:
         left_out = [k for k, (held, _) in enumerate(self._held) if _key(held) not in chosen]
         counted = chosen if beside is None else {*chosen, _key(beside)}
         rates = [form.drift_um_s for held, form in self._held if _key(held) in counted]
-        return FormsBesides(self, left_out, float(np.sqrt(np.mean(np.square(rates)))))
+        return FormsBesides(self, left_out, sqrt(np.mean(np.square(rates))))
 
     def rows(self, runs: Sequence[Held]) -> Integers:
         """Return the row numbers of stored runs."""
@@ -203,7 +204,7 @@ class FormsBesides:
         seen = seen - basis @ (basis.T @ seen)
         seen -= self._share[size] * drift @ (drift.T @ seen)
         pull = seen.T @ self.white[size][:, 0]
-        return float(np.sqrt(pull @ np.linalg.solve(seen.T @ seen, pull)))
+        return sqrt(pull @ np.linalg.solve(seen.T @ seen, pull))
 
 
 class _Columns:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import median_of, place_of_largest
 from dbbstation.quality.finding import Finding, Name, found, undecided
 from dbbstation.quality.limits import SHARE, quantile
 
@@ -140,14 +141,14 @@ def held(raw: RawCircle) -> Finding:
     if len(first) == 1:
         return undecided(Name.HELD, ALL_EQUAL)
     durations = raw.t_s[last] - raw.t_s[first]
-    longest = int(np.argmax(durations))
+    longest = place_of_largest(durations)
     most = equal_limit(*moving_noise(raw), len(raw))
     value, place = float(durations[longest]), f"{raw.theta_deg[first[longest]]:.0f} degrees"
     if most == inf:
         return undecided(
             Name.HELD, f"at most {value:.1f} s; the step of the readings is not finer than their noise", value
         )
-    limit = max(SHORTEST_S, most * float(np.median(np.diff(raw.t_s))))
+    limit = max(SHORTEST_S, most * median_of(np.diff(raw.t_s)))
     stated = f"the length stands still for {value:.1f} s at {place}"
     return found(Name.HELD, value, limit, "the length never stands still", f"{stated}: {AFTER_HELD}")
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from dbbstation.computing.arrays import norm_of
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.quality.all_runs import AllForms, bar_of_all, programs_of_all
 from dbbstation.quality.between import direction, other_direction, repeat
@@ -167,7 +166,7 @@ class SessionRuns:
             repeats_um=tuple(pair.apart_um for pair in repeats),
             directions_stated=tuple(pair.sigmas for pair in directions if pair.sigmas is not None),
             repeats_stated=tuple(pair.sigmas for pair in repeats if pair.sigmas is not None),
-            across_um=tuple(float(np.linalg.norm(across(pair.one) - across(pair.other))) for pair in directions),
+            across_um=tuple(norm_of(across(pair.one) - across(pair.other)) for pair in directions),
             local_um=tuple(pair.local_um for pair in directions if pair.local_um is not None),
             opposite=self._opposite(one),
             earlier=self._earlier(one),

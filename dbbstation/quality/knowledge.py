@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.circles.analysis import CircleAnalysis, analyse, feed_shown
+from dbbstation.computing.arrays import hypot_of, norm_of
 from dbbstation.errors import TraceError
 from dbbstation.inference.harmonics import SAMPLES_PER_HARMONIC, amplitudes
 from dbbstation.trace.cut import cut, edges_of, lost_on_turn, unusable_on_turn
@@ -186,7 +188,7 @@ class Seen:
         """Return the standard uncertainty of each coefficient due to noise [µm]."""
         if self.analysis is None:
             return 0.0
-        return self.analysis.noise.sigma_um / float(np.sqrt(len(self.analysis.raw)))
+        return self.analysis.noise.sigma_um / sqrt(len(self.analysis.raw))
 
     @cached_property
     def drift_um(self) -> tuple[float, float] | None:
@@ -290,7 +292,7 @@ class Others:
 
 def apart_um(one: Seen, other: Seen) -> tuple[float, float]:
     """Return two runs' rms difference up to three undulations, and the standard uncertainty of each coefficient [µm]."""
-    return float(np.linalg.norm(one.coefficients_um - other.coefficients_um)), float(np.hypot(one.u_um, other.u_um))
+    return norm_of(one.coefficients_um - other.coefficients_um), hypot_of(one.u_um, other.u_um)
 
 
 ACROSS = (HIGHEST_HARMONIC + 1, HIGHEST_HARMONIC + 3)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import chdtri, fdtri, stdtrit
 
+from dbbstation.computing.arrays import median_of
 from dbbstation.quality.finding import Name
 
 if TYPE_CHECKING:
@@ -55,12 +57,12 @@ def largest_of(count: float, freedom: float) -> float:
 
 def length_quantile(dimensions: int) -> float:
     """Return the length, in standard deviations, that a sound vector exceeds with probability SHARE."""
-    return float(np.sqrt(chdtri(dimensions, SHARE)))
+    return sqrt(chdtri(dimensions, SHARE))
 
 
 def scaled_length_quantile(freedom: float) -> float:
     """Return the root of the chi-square quantile for real degrees of freedom."""
-    return float(np.sqrt(chdtri(max(freedom, 1.0), SHARE)))
+    return sqrt(chdtri(max(freedom, 1.0), SHARE))
 
 
 def ratio_quantile(above: float, below: float) -> float:
@@ -78,7 +80,7 @@ def scale_of(values: Sequence[float]) -> tuple[float, float]:
     # as the standard deviation of 0.37 times as many sound values [Rousseeuw and Croux, J. Am. Stat. Assoc. 88 (1993)].
     if not values:
         return 0.0, 0.0
-    return float(np.median(np.abs(values))) / _NORMAL_MEDIAN, ROBUST_SHARE * len(values)
+    return median_of(np.abs(values)) / _NORMAL_MEDIAN, ROBUST_SHARE * len(values)
 
 
 _NORMAL_MEDIAN = 0.674490
@@ -95,14 +97,14 @@ def length_limit(lengths: Sequence[float], dimensions: int) -> float:
         lengths: of the other vectors; only their median square counts.
     """
     median = float(chdtri(dimensions, 0.5)) / dimensions
-    variance = float(np.median(np.square(lengths))) / median
+    variance = median_of(np.square(lengths)) / median
     known = ROBUST_SHARE * dimensions * len(lengths)
-    return float(np.sqrt(variance * ratio_quantile(dimensions, max(known, 1.0))))
+    return sqrt(variance * ratio_quantile(dimensions, max(known, 1.0)))
 
 
 def median_length(dimensions: int) -> float:
     """Return the median length of a sound vector, in standard deviations."""
-    return float(np.sqrt(chdtri(dimensions, 0.5)))
+    return sqrt(chdtri(dimensions, 0.5))
 
 
 def joined(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
@@ -111,4 +113,4 @@ def joined(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
     if not variance > 0.0:
         return 0.0, _MANY
     below = sum(size**4 / freedom for size, freedom in parts if size > 0.0 and freedom > 0.0)
-    return float(np.sqrt(variance)), float(variance**2 / below) if below > 0.0 else _MANY
+    return sqrt(variance), float(variance**2 / below) if below > 0.0 else _MANY

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import norm_of, place_of_largest
 from dbbstation.quality.finding import Finding, Name, found, undecided
 from dbbstation.quality.knowledge import LOCAL_COEFFICIENTS, LOCAL_HARMONIC, local_columns
 from dbbstation.quality.limits import FEWEST_OTHERS, SCATTERING, length_limit
@@ -47,8 +48,8 @@ def local_difference(one: Seen, others: Others) -> Finding:
     differs, counts = one.local_um - against.local_um, _compared(one, against)
     alike = one.run.circle.direction is against.run.circle.direction
     value = locally_apart_um(one, against)
-    by_reversals = 0.0 if alike else OTHER_REVERSALS * float(np.linalg.norm(differs[(ORDERS > LOWEST) & ~counts]))
-    sawtooth = float(np.linalg.norm(1.0 / ORDERS[counts])) / (2.0 * np.pi)
+    by_reversals = 0.0 if alike else OTHER_REVERSALS * norm_of(differs[(ORDERS > LOWEST) & ~counts])
+    sawtooth = norm_of(1.0 / ORDERS[counts]) / (2.0 * np.pi)
     drifts = [
         abs(each.analysis.closure.height_um) for each in (one, against) if each.analysis and each.analysis.closure
     ]
@@ -72,7 +73,7 @@ def local_difference(one: Seen, others: Others) -> Finding:
 
 def locally_apart_um(one: Seen, against: Seen) -> float:
     """Return the rms difference in the compared undulations [µm]."""
-    return float(np.linalg.norm((one.local_um - against.local_um)[_compared(one, against)]))
+    return norm_of((one.local_um - against.local_um)[_compared(one, against)])
 
 
 def _compared(one: Seen, against: Seen) -> Flags:
@@ -83,5 +84,5 @@ def _compared(one: Seen, against: Seen) -> Flags:
 def _peak(differs_um: Floats) -> tuple[float, float]:
     theta_deg = np.arange(0.0, 360.0, 1.0)
     path = local_columns(np.radians(theta_deg)) @ differs_um
-    top = int(np.argmax(np.abs(path)))
+    top = place_of_largest(np.abs(path))
     return float(theta_deg[top]), float(path[top])

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import hypot_of, norm_of
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.forms import own_um2
 from dbbstation.quality.knowledge import HIGHER
@@ -31,7 +32,7 @@ def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = 
     if expected is None:
         return undecided(Name.RADIUS, "no expected radius is known")
     off_um = one.mean_radial_error_um - 1e3 * expected.radial_mm
-    u_um = float(np.hypot(1e3 * np.sqrt(expected.covariance_mm2[2, 2]), one.noise.sigma_um / np.sqrt(len(one.raw))))
+    u_um = hypot_of(1e3 * np.sqrt(expected.covariance_mm2[2, 2]), one.noise.sigma_um / np.sqrt(len(one.raw)))
     stated = f"the bar reads {one.mean_radial_error_um:+.1f} µm on average, expected {1e3 * expected.radial_mm:+.1f} µm{BY_OTHERS if by_others else ''}"
     return found(
         Name.RADIUS,
@@ -67,7 +68,7 @@ def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = Fa
     noise = 2.0 * one.noise.sigma_um**2 / len(one.raw)
     covariance = 1e6 * expected.covariance_mm2[:2, :2] + noise * np.eye(2)
     # The limit is the sound centre's ellipse, in the direction of this deviation.
-    size, limit = float(np.linalg.norm(off_um)), limit_along(covariance, off_um)
+    size, limit = norm_of(off_um), limit_along(covariance, off_um)
     where = f"expected{BY_OTHERS if by_others else ''}"
     stated = f"the centre is {size:.1f} µm from where it is {where}, {off_um[0]:+.1f} in X and {off_um[1]:+.1f} in Y"
     return found(
@@ -90,7 +91,7 @@ def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Fi
     # The centre of a ball set up under the spindle contains no information.
     rows = list(range(len(expected.form_um))) if expected.place_known else [0, *HIGHER]
     off = (one.coefficients_um - expected.form_um)[rows]
-    value, limit = float(np.linalg.norm(off)), limit_along(covariance[np.ix_(rows, rows)], off)
+    value, limit = norm_of(off), limit_along(covariance[np.ix_(rows, rows)], off)
     where = f"expected{BY_OTHERS if by_others else ''}"
     stated = f"{value:.1f} µm rms from where mean, centre, ellipse and triangle are {where}"
     wrong = f"{stated}: check tilt, plane and radius of the program, and how the plate sits"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import average_of
 from dbbstation.quality.finding import Finding, Name, found, undecided
 from dbbstation.quality.knowledge import form_columns
 from dbbstation.quality.limits import quantile
@@ -51,7 +53,7 @@ def scale(one: Seen, others: Others) -> Finding:
 
 def _excess_um(one: Seen) -> float:
     assert one.ways is not None  # noqa: S101 - asked before
-    return float(np.mean([way.way_um for way in one.ways])) - 1e3 * one.run.circle.feed_in_mm
+    return average_of([way.way_um for way in one.ways]) - 1e3 * one.run.circle.feed_in_mm
 
 
 def _u_um(runs: list[tuple[Seen, Expected]]) -> float:
@@ -66,4 +68,4 @@ def _u_um(runs: list[tuple[Seen, Expected]]) -> float:
             share = 1.0 if key in expected.moving else circle.feed_in_mm / circle.bar_mm
             mine = share * (at_corners @ effect)
             effects[key] = effects[key] + mine if key in effects and effects[key].shape == mine.shape else mine
-    return float(np.sqrt(noise + sum(float(each @ each) for each in effects.values())))
+    return sqrt(noise + sum(float(each @ each) for each in effects.values()))

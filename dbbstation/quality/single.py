@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import bdtrik
 
 from dbbstation.circles.noise import LEAST_UM
+from dbbstation.computing.arrays import hypot_of, median_of, sum_of
 from dbbstation.quality.bump import bump
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.held import ALL_EQUAL, SHORTEST_S, chance_equal, equal_readings, held, moving_noise
@@ -38,7 +40,7 @@ def repeated(raw: RawCircle) -> Finding:
     short = raw.t_s[last] - raw.t_s[first] < SHORTEST_S
     squares_mm2, count, step_mm = moving_noise(raw)
     chance = chance_equal(squares_mm2, count, step_mm)
-    share = float(np.sum((last - first)[short])) / max(count, 1)
+    share = sum_of((last - first)[short]) / max(count, 1)
     if chance >= 1.0:
         why = f"{100.0 * share:.0f} % of the readings are the same as the one before; their step is not finer than their noise"
         return undecided(Name.REPEATED, why, 100.0 * share)
@@ -72,10 +74,10 @@ def noise(one: CircleAnalysis, others: Others) -> Finding:
     if len(known) < FEWEST_OTHERS:
         return undecided(Name.NOISE, f"{value:.2f} µm; fewer than {FEWEST_OTHERS} other runs to hold it against", value)
     logs = np.log(known)
-    middle = float(np.median(logs))
-    own = 1.0 / float(np.sqrt(2.0 * one.noise.reading_freedom))
+    middle = median_of(logs)
+    own = 1.0 / sqrt(2.0 * one.noise.reading_freedom)
     # The median of n values has the standard error sqrt(pi / 2n) times their scatter.
-    u = own * float(np.sqrt(1.0 + 0.5 * np.pi / len(known)))
+    u = own * sqrt(1.0 + 0.5 * np.pi / len(known))
     log_limit = middle + _beyond(u, np.inf, [(float(log - middle), own) for log in logs])
     if log_limit > LARGEST_LOG:
         why = f"{value:.2f} µm; the noise of the other runs differs too much to hold it against"
@@ -120,7 +122,7 @@ def drift(one: CircleAnalysis, others: Others, expected: Expected | None = None)
         return undecided(Name.DRIFT, "too few samples to separate noise from form")
     passes = one.passes
     u = passes.u_mean_um(one.noise.sigma_um)
-    limit = _beyond(float(np.hypot(u, _by_feed_um(one))), one.noise.freedom, others.drift_um)
+    limit = _beyond(hypot_of(u, _by_feed_um(one)), one.noise.freedom, others.drift_um)
     limit = max(limit, _left_open_um(expected))
     stated = f"the bar reads {passes.mean_um:+.2f} µm more after one turn of {passes.turn_s:.0f} s"
     return found(
@@ -142,7 +144,7 @@ def _by_feed_um(one: CircleAnalysis) -> float:
     if one.feed_mm_min is None:
         return 0.0
     shown, u = one.feed_mm_min
-    share = float(np.hypot(shown - one.raw.circle.feed_mm_min, u)) / one.raw.circle.feed_mm_min
+    share = hypot_of(shown - one.raw.circle.feed_mm_min, u) / one.raw.circle.feed_mm_min
     reach = np.radians(one.raw.circle.overshoot_deg)
     phi = np.radians(one.raw.phi_deg)
     ends = np.interp([reach, 2.0 * np.pi - reach], phi, one.raw.length_mm)
@@ -156,8 +158,8 @@ def _beyond(u: float, freedom: float, others: Sequence[tuple[float, float]]) -> 
         scale, known = scale_of([value / own for value, own in others])
         # A few runs may scatter by more than their noise by chance.
         if scale > 1.0 + CHANCE_SIGMAS / np.sqrt(2.0 * known):
-            usual = float(np.median([own for _, own in others]))
-            parts.append((usual * float(np.sqrt(scale**2 - 1.0)), known))
+            usual = median_of([own for _, own in others])
+            parts.append((usual * sqrt(scale**2 - 1.0), known))
     total, together = joined(parts)
     return quantile(together) * total
 
@@ -191,7 +193,7 @@ def _feed_by_duration(one: Seen, others: Others) -> Finding:
     due = due_s(circle)
     usual, scatter = LONGEST_STOP_S, 0.0
     if len(others.longer_s) >= FEWEST_OTHERS:
-        usual = float(np.median(others.longer_s))
+        usual = median_of(others.longer_s)
         scatter, _ = scale_of([longer - usual for longer in others.longer_s])
     limit = max(FEED_TOLERANCE * due + UNEVEN_STOP_S, quantile(np.inf) * scatter)
     over = one.longer_s - usual
@@ -259,7 +261,7 @@ def _slower(one: Seen, others: Others) -> Finding | None:
     if one.feed_mm_min is not None or one.longer_s is None:
         return None
     due = due_s(circle)
-    usual = float(np.median(others.longer_s)) if len(others.longer_s) >= FEWEST_OTHERS else 0.0
+    usual = median_of(others.longer_s) if len(others.longer_s) >= FEWEST_OTHERS else 0.0
     longer = (one.longer_s - usual) / due
     begun_s, ended_s = edges_of(recording, circle)
     turn_s = 360.0 / circle.turning_deg_s * np.array([1.0, 1.0 + longer])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.circles.noise import LEAST_UM
+from dbbstation.computing.arrays import median_of, place_of_largest
 from dbbstation.quality.bump import FEWEST, largest_at, near_reversals
 from dbbstation.quality.finding import Finding, Name, found, undecided
 from dbbstation.quality.limits import ROBUST_SHARE, largest_of, scale_of
@@ -53,7 +54,7 @@ def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
     candidates: list[tuple[float, float, int]] = []
     if len(away) >= LARGEST_BLOCK:
         limits = largest_of(len(away), freedom) * scale[away] + rounding
-        worst = int(np.argmax(np.abs(apart[away]) / limits))
+        worst = place_of_largest(np.abs(apart[away]) / limits)
         candidates.append((abs(float(apart[away[worst]])), float(limits[worst]), int(away[worst])))
     tops = [
         largest_at(apart, np.flatnonzero(sound & (near == number))) for number in np.unique(near[sound & (near >= 0)])
@@ -91,7 +92,7 @@ def _apart(values_um: Floats, phi_deg: Floats) -> tuple[Floats, Flags]:
     inner = slice(BESIDE, count - BESIDE)
     apart[inner] = values_um[inner] - np.median(beside, axis=1)
     steps = np.diff(phi_deg)
-    even = np.abs(steps) <= UNEVEN * float(np.median(np.abs(steps)))
+    even = np.abs(steps) <= UNEVEN * median_of(np.abs(steps))
     sound[inner] = np.lib.stride_tricks.sliding_window_view(even, 2 * BESIDE).all(axis=1)
     return apart, sound
 

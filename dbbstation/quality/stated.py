@@ -5,10 +5,12 @@ Shared causes cancel if their effects are equal; the difference has the covarian
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import norm_of, sum_of
 from dbbstation.quality.limits import length_quantile, scaled_length_quantile
 
 if TYPE_CHECKING:
@@ -59,14 +61,14 @@ def sigmas_apart(one: Seen, other: Seen) -> float | None:
     if covariance is None:
         return None
     off = one.coefficients_um - other.coefficients_um
-    return float(np.sqrt(off @ np.linalg.solve(covariance, off)))
+    return sqrt(off @ np.linalg.solve(covariance, off))
 
 
 def drifted_um(one: Seen, other: Seen) -> float:
     """Return the standard deviation of the mean reading's drift between two runs, extrapolated from their turns [µm]."""
     if one.run.started_s is None or other.run.started_s is None:
         return 0.0
-    rate = float(np.sqrt(0.5 * (one.drift_um_s**2 + other.drift_um_s**2)))
+    rate = sqrt(0.5 * (one.drift_um_s**2 + other.drift_um_s**2))
     return rate * abs(one.run.started_s - other.run.started_s)
 
 
@@ -80,9 +82,9 @@ def unseen_um2(one: Seen, other: Seen) -> float:
 
 def limit_along(covariance: Floats, off: Floats) -> float:
     """Return a sound vector's limit along `off`, from the ellipsoid that it leaves with probability SHARE."""
-    size = float(np.linalg.norm(off))
+    size = norm_of(off)
     along = off / size if size > 0.0 else np.eye(len(off))[0]
-    return length_quantile(len(off)) / float(np.sqrt(along @ np.linalg.solve(covariance, along)))
+    return length_quantile(len(off)) / sqrt(along @ np.linalg.solve(covariance, along))
 
 
 def limit_of_length(covariance: Floats) -> float:
@@ -90,5 +92,5 @@ def limit_of_length(covariance: Floats) -> float:
 
     The squared length is approximated by a scaled chi-square variable of equal mean and variance.
     """
-    trace, squares = float(np.trace(covariance)), float(np.sum(covariance**2))
-    return scaled_length_quantile(trace**2 / squares) * float(np.sqrt(squares / trace)) if trace > 0.0 else 0.0
+    trace, squares = float(np.trace(covariance)), sum_of(covariance**2)
+    return scaled_length_quantile(trace**2 / squares) * sqrt(squares / trace) if trace > 0.0 else 0.0

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import chdtrc, chdtri, logsumexp
 
+from dbbstation.computing.arrays import median_of, place_of_largest
 from dbbstation.quality.forms import FIRST_COSINE, FIRST_SINE
 from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.limits import FEWEST_OTHERS, SHARE, median_length
@@ -86,7 +87,7 @@ def expected_beside(both: Together | None) -> Expected | None:
     scatter = both.apart_um - apart
     covariance = np.einsum("s,sij->ij", weights, both.covariance_um2)
     covariance += np.einsum("s,si,sj->ij", weights, scatter, scatter)
-    covariance *= _straying(both, int(np.argmax(of_others))) ** 2 * _tail(weights, both.covariance_um2)
+    covariance *= _straying(both, place_of_largest(of_others)) ** 2 * _tail(weights, both.covariance_um2)
     one = both.runs[0]
     return _placed(own, one.run.circle, read_um(one) - expected_um(one.run) - apart, covariance)
 
@@ -107,7 +108,7 @@ def _straying(both: Together, size: int) -> float:
     if len(both.rows) < FEWEST_OTHERS:
         return 1.0
     lengths = [both.others.length_without(size, rows) / median_length(len(rows)) for rows in both.rows.values()]
-    return max(float(np.median(lengths)), 1.0)
+    return max(median_of(lengths), 1.0)
 
 
 def _placed(own: Expected, circle: Circle, more_um: Floats, covariance_um2: Floats) -> Expected:

@@ -11,6 +11,7 @@ from matplotlib.patches import Circle as Ring
 from dbbstation.calibration.checks.scatter import fine_noise_mm
 from dbbstation.calibration.checks.visibility import visibility
 from dbbstation.calibration.reporting.residual_map import ball_shifts, circle_tests, residual_map
+from dbbstation.computing.arrays import hypot_of, largest_size
 from dbbstation.report.drawing import (
     AFTER,
     BEFORE,
@@ -51,7 +52,7 @@ def calibration_figure(calibration: Calibration, wanted: Wanted = FigureFormat.S
     with in_style():
         if isinstance(wanted, OnePanel):
             tests = circle_tests(calibration)
-            reach = max(float(np.abs(circle.before_um).max()) for test in tests for circle in test.circles)
+            reach = max(largest_size(circle.before_um) for test in tests for circle in test.circles)
             panels = {test.name: partial(_circle, test=test, ring=step_of(reach / 2.0)) for test in tests}
             centres = {"centres": partial(_centres, tests=tests, k=1, title="calibrated")}
             return wanted.draw(centres | {"balls": partial(_balls, balls=ball_shifts(calibration))} | panels)
@@ -75,7 +76,7 @@ def draw_calibration(calibration: Calibration) -> ShownFigure:
 
 
 def _circles(part: SubFigure, tests: Sequence[CircleTest], rows: int) -> None:
-    reach = max(float(np.abs(circle.before_um).max()) for test in tests for circle in test.circles)
+    reach = max(largest_size(circle.before_um) for test in tests for circle in test.circles)
     ring = step_of(reach / 2.0)
     heading(part, f"measured less predicted length about the commanded circle, one ring {ring:g} µm")
     panels: Any = part.subplots(rows, min(COLUMNS, len(tests)), squeeze=False)
@@ -134,7 +135,7 @@ def _centres(axes: Axes, tests: Sequence[CircleTest], k: int, title: str) -> Non
         colour = SET[levels.index(round(float(ball[2]))) % len(SET)]
         axes.plot(*ball[:2], "o", color="#999999", markersize=4.0, zorder=1)
         axes.quiver(*ball[:2], *arrow, color=colour, angles="xy", scale_units="xy", scale=per_mm, width=0.006, zorder=2)
-        tip = ball[:2] + arrow / per_mm + 7.0 * arrow / max(float(np.hypot(*arrow)), 1e-12)
+        tip = ball[:2] + arrow / per_mm + 7.0 * arrow / max(hypot_of(*arrow), 1e-12)
         axes.text(float(tip[0]), float(tip[1]), test.name, color=colour, ha="center", va="center", fontsize=8)
     middle, half = (where.min(axis=0) + where.max(axis=0)) / 2.0, np.ptp(where, axis=0).max() / 2.0 + LONGEST_MM + 20.0
     axes.set_xlim(middle[0] - half, middle[0] + half)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dbbstation.computing.arrays import sum_of
 from dbbstation.plan.plan import Direction
 from dbbstation.report.drawing import (
     AFTER,
@@ -57,7 +58,7 @@ def compare_figure(found: Comparison, wanted: Wanted = FigureFormat.SVG) -> Any:
 
 def _worst(found: Comparison) -> list[RunDifference]:
     by_test: dict[str, RunDifference] = {}
-    for run in sorted(found.runs, key=lambda run: (-float(np.sum(run.found_mm**2)), -run.rms_um)):
+    for run in sorted(found.runs, key=lambda run: (-sum_of(run.found_mm**2), -run.rms_um)):
         by_test.setdefault(run.test, run)
     return list(by_test.values())[:OVERLAYS]
 

@@ -10,6 +10,7 @@ import numpy as np
 from dbbstation.calibration.checks.scatter import fine_noise_mm
 from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.calibration.reporting.residual_map import residual_map
+from dbbstation.computing.arrays import largest_size
 from dbbstation.diagnosis.shapes import EVERY, PULL, SIGNED, TOWARDS
 from dbbstation.inference.verdict import Verdict
 from dbbstation.plan.plan import Direction
@@ -242,7 +243,7 @@ def _traces(part: SubFigure, gains: Sequence[GainOfTest], *, found: bool) -> Non
             axes.set_xticks(QUARTERS)
             axes.set_xlim(0.0, 360.0)
         column[-1].set_xlabel("angle from +X to +Y, °")
-    reach = 1.05 * max(float(np.abs(axes.get_ylim()).max()) for axes in panels[1:, 0])
+    reach = 1.05 * max(largest_size(axes.get_ylim()) for axes in panels[1:, 0])
     panels[1, 0].set_ylim(-reach, reach)
     panels[2, 0].set_ylim(-reach, reach)
     panels[0, 0].set_ylabel("off the commanded\ncircle, µm")

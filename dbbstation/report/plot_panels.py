@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from matplotlib.patches import Circle as Ring
 
 from dbbstation.circles.estimates import FIRST
+from dbbstation.computing.arrays import hypot_of, largest_size
 from dbbstation.plan.plan import FULL_TURN_DEG, Direction
 from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, SET
 from dbbstation.report.polar import CIRCLE, REACH, SIZE, step_of, thinned
@@ -43,7 +45,7 @@ def draw_polar(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn], reach_
         reach_um: largest drawn deviation; None: the greatest.
     """
     found = [(one.analysed, thin) for one, thin in drawn]
-    most_um = reach_um or max(float(np.abs(analysis.residual_um).max()) for analysis, _ in found)
+    most_um = reach_um or max(largest_size(analysis.residual_um) for analysis, _ in found)
     scale, step_um = REACH / max(most_um, 1e-3), step_of(most_um)
     lines = [name, f"G {_figures(drawn)} µm; one division {step_um:g} µm"]
     top = _caption(sheet, box, lines)
@@ -105,7 +107,7 @@ def draw_spectrum(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) -> 
     """Draw the amplitudes of undulations, and the noise."""
     spectra = [(one.analysed, one.spectrum, thin) for one, thin in drawn]
     noise = [each.noise_um for _, each, _ in spectra if np.isfinite(each.noise_um)]
-    noise_um = float(np.sqrt(np.mean(np.square(noise)))) if noise else float("nan")
+    noise_um = sqrt(np.mean(np.square(noise))) if noise else float("nan")
     subtitle = f"noise alone {noise_um:.2g} µm, dotted" if noise else "noise not known: too few samples"
     axes = _chart(sheet, box, [name, subtitle], "amplitude, µm")
     least = 1e-4  # a tenth of what bars resolve; zero has no place on this scale
@@ -221,7 +223,7 @@ def draw_map(
         axes.plot(*ball, "o", color="#555555", markersize=4.0)
         _arrow(axes, ball, along, AFTER)
     _arrow(axes, key_at, np.array([LONGEST_IN * key_um / longest_um, 0.0]), "black")
-    labels = [f"{test}: {float(np.hypot(*um)):.1f} µm" for test, um in centres_um.items()]
+    labels = [f"{test}: {hypot_of(*um):.1f} µm" for test, um in centres_um.items()]
     sizes = [(width_of_in(label, TEXT_PT) + 0.04, line_in(TEXT_PT)) for label in labels]
     keep_off = [_around(place, _BALL_IN) for place in at]
     keep_off += [_around(place + along, _BALL_IN) for place, along in zip(at, arrows, strict=True)]
@@ -230,7 +232,7 @@ def draw_map(
         if put is None:
             continue
         middle = np.array([put.left + 0.5 * put.width, put.bottom + 0.5 * put.height])
-        if float(np.hypot(*(middle - ball))) > _FAR_IN + 0.5 * put.width:
+        if hypot_of(*(middle - ball)) > _FAR_IN + 0.5 * put.width:
             axes.plot(*np.array([ball, middle]).T, color="#999999", linewidth=0.4, zorder=0)
         axes.text(
             float(middle[0]), float(middle[1]), label, ha="center", va="center", fontsize=TEXT_PT, parse_math=False

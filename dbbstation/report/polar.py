@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.reporting.prediction import smooth_lengths_mm
 from dbbstation.circles.estimates import BudgetQuantity
+from dbbstation.computing.arrays import largest_size
 from dbbstation.trace.analysis import horizontal_radius_mm, path_about_ball
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ def polar(title: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCi
 
 def polar_of(title: str, circle: Circle, paths: Sequence[PolarTrace], not_drawn: int = 0) -> Polar:
     """Return the paths of one circle with one scale."""
-    most_um = max(float(np.abs(one.deviation_um).max()) for one in paths)
+    most_um = max(largest_size(one.deviation_um) for one in paths)
     scale = REACH / max(most_um, 1e-3)  # a perfect circle has no reach of its own
     tilt = ", ".join(f"{axis} {angle:g}°" for axis, angle in zip("ABC", circle.tilt_deg, strict=True) if angle)
     centre = ", ".join(f"{axis} {place:.10g}" for axis, place in zip("XYZ", circle.centre_mm, strict=True))

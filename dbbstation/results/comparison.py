@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 from pydantic import Field
 
+from dbbstation.computing.arrays import median_of, sum_of
 from dbbstation.diagnosis.compare.findings import DirectionHalves, LargestEffect, RunDifference
 from dbbstation.diagnosis.compare.pairs import NotComparable
 from dbbstation.facts import of_facts, picked
@@ -158,7 +158,7 @@ def comparison_result(
     notes: tuple[str, ...] = (),
 ) -> ComparisonResult:
     """Return the result of a comparison; lengths in µm, largest runs first."""
-    largest_first = sorted(found.runs, key=lambda run: (-run.differs, -float(np.sum(run.found_mm**2)), -run.rms_um))
+    largest_first = sorted(found.runs, key=lambda run: (-run.differs, -sum_of(run.found_mm**2), -run.rms_um))
     pairs, held_out = found.matching, found.trial.held_out
     before, after = found.held_out
     return of_facts(
@@ -231,8 +231,8 @@ def verdict_text(found: Comparison) -> str:
             f"These runs do not decide whether the sessions differ (probability {found.probability:.2f}); if they do, it is "
             f"{', '.join(label_of(finding) for finding in found.there)}."
         )
-    centre = float(np.median([run.centre_shift_uncertainty_um for run in found.runs]))
-    radial = float(np.median([run.mean_radial_change_uncertainty_um for run in found.runs]))
+    centre = median_of([run.centre_shift_uncertainty_um for run in found.runs])
+    radial = median_of([run.mean_radial_change_uncertainty_um for run in found.runs])
     return (
         f"No difference beyond noise, balls and bars (probability of one {found.probability:.2f}). A strut that had become "
         f"{1e3 * found.noticed_mm:.2g} µm longer would have been found; centres are compared to ± {centre:.2g} µm, mean lengths "

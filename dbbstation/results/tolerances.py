@@ -13,6 +13,7 @@ from dbbstation.circles.budget import budgets, pair_budgets
 from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.circles.extremes import without_noise
 from dbbstation.circles.path import TOLERATED, Filter
+from dbbstation.computing.arrays import hypot_of, norm_of
 from dbbstation.facts import OfRunInSession, of_facts
 from dbbstation.facts.held import HeldTolerance, WorstCircle
 from dbbstation.plan.tolerance import FILTERED, OF_A_MODEL, OF_BOTH_DIRECTIONS, CircleFigure
@@ -131,10 +132,10 @@ def sizes_of(one: CircleAnalysis, known: SetUpKnowledge) -> dict[CircleFigure, S
 def _off_centre(x: Budget, y: Budget) -> Size:
     """Return the length of a centre offset without its bias by uncertainty, and its u from both axes."""
     off, u = np.array([x.value_um, y.value_um]), np.array([x.known_um, y.known_um])
-    length = float(np.hypot(*off))
+    length = hypot_of(*off)
     # A centre that is not off has no direction: either axis may be the one that counts.
     along = np.abs(off) / length if length > 0.0 else np.sqrt([0.5, 0.5])
-    value, u_value = without_noise(length, float(np.linalg.norm(along * u)))
+    value, u_value = without_noise(length, norm_of(along * u))
     why = x.why_not or y.why_not
     return Size(value, None if why else u_value, why, u_value)
 

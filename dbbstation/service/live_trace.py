@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import largest_size
 from dbbstation.errors import StationError, TraceError
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.former import former_sessions
@@ -60,7 +61,7 @@ class LiveTrace:
         trace = cls(run, turn.circle)
         deviation_um = 1e3 * (turn.length_mm - turn.circle.bar_mm)
         trace._append(turn.circle.theta_deg(turn.phi_deg), deviation_um)
-        trace.largest_um = float(np.abs(deviation_um).max())
+        trace.largest_um = largest_size(deviation_um)
         trace.centre()
         return trace
 
@@ -87,7 +88,7 @@ class LiveTrace:
             left_um[known] = 1e3 * best_circle(self.theta_deg[known], radius_mm)[2]
         except TraceError:
             return
-        self.centred = Derived(View.CENTRED, self, left_um, float(np.abs(left_um[known]).max()))
+        self.centred = Derived(View.CENTRED, self, left_um, largest_size(left_um[known]))
 
     def add(self, samples: Sequence[Sample]) -> None:
         """Add samples in time order."""
@@ -113,7 +114,7 @@ class LiveTrace:
         for step in np.unique(steps).tolist():
             self._take(step, theta[steps == step], shown[steps == step])
         if usable.any():
-            self.largest_um = max(self.largest_um, float(np.abs(deviation[usable]).max()))
+            self.largest_um = max(self.largest_um, largest_size(deviation[usable]))
 
     def _take(self, step: int, theta_deg: Floats, deviation_um: Floats) -> None:
         if step == self._step:
@@ -175,7 +176,7 @@ def difference(ccw: Derived, cw: Derived) -> Derived | None:
     less_um = np.interp(ccw.theta_deg, cw.theta_deg[placed], cw.deviation_um[placed], period=_TURN_DEG)
     left_um = ccw.deviation_um - less_um
     known = np.isfinite(left_um)
-    return Derived(View.DIFFERENCE, ccw.measured, left_um, float(np.abs(left_um[known]).max())) if known.any() else None
+    return Derived(View.DIFFERENCE, ccw.measured, left_um, largest_size(left_um[known])) if known.any() else None
 
 
 def last_traces(folder: Path, test: str) -> dict[Direction, LiveTrace]:

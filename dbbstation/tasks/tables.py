@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import average_of, largest_size, range_of, sum_of
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.units import PLAIN, Meaning, meaning_of, stated_meaning
 from dbbstation.errors import MOST_FAULTS, ArgumentError, Faults, InputError, Problem, refuse
@@ -350,13 +351,13 @@ class _Reader:
         """Refuse a constant measured value, or a constant difference; rounding is no noise."""
         apart, what = measured - simulated, f"`{self._asked.measured}`"
         if np.ptp(measured) > 0.0:
-            rounding = 8.0 * np.spacing(max(float(np.abs(measured).max()), float(np.abs(simulated).max())))
-            if float(np.ptp(apart)) > rounding:
+            rounding = 8.0 * np.spacing(max(largest_size(measured), largest_size(simulated)))
+            if range_of(apart) > rounding:
                 return
             what += f" less `{self._asked.simulated}`"
         else:
             apart = measured
-        file, size = self._files[0], f"{float(np.mean(apart)):.6g} {self._unit}".strip()
+        file, size = self._files[0], f"{average_of(apart):.6g} {self._unit}".strip()
         what += f" is {size} in every row: no difference is left to explain"
         raise InputError.of(file.file, what, "check that these are the columns that you mean", line=file.header)
 
@@ -452,8 +453,8 @@ class _Reader:
         """Return whether measured and simulated values together give a column, and simulated values alone do not."""
         asked = self._asked
         both = np.column_stack([np.ones(len(variable.values)), kept[asked.simulated], kept[asked.measured]])
-        alone, beside = (float(np.sum(np.square(left_by(columns, variable.values)))) for columns in (both[:, :2], both))
-        whole = SAME * float(np.sum((variable.values - variable.values.mean()) ** 2))
+        alone, beside = (sum_of(np.square(left_by(columns, variable.values))) for columns in (both[:, :2], both))
+        whole = SAME * sum_of((variable.values - variable.values.mean()) ** 2)
         if alone <= whole or beside > whole:
             return False
         self.notes.append(f"`{variable.name}` is measured and simulated value over again, and is left out")
@@ -466,7 +467,7 @@ def _is_a_line(one: Floats, other: Floats) -> bool:
         return True
     a, b = (column - column.mean() for column in (one, other))
     left = b - a * float(a @ b) / float(a @ a)
-    return float(np.abs(left).max()) <= ROUNDED * float(np.abs(b).max())
+    return largest_size(left) <= ROUNDED * largest_size(b)
 
 
 ROUNDED = 1e-9

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import chdtri
 
+from dbbstation.computing.arrays import sum_of
 from dbbstation.inference.harmonics import LOW, Misfit, misfit, smooth
 from dbbstation.inference.left_over import Remainder, remainder
 from dbbstation.trace.recording import means, sector_of
@@ -112,7 +114,7 @@ def seats_of(calibration: Calibration) -> list[MountingOffset]:
                 stated_mm=size,
                 shift_mm=np.asarray(shift),
                 spread_mm2=np.asarray(left),
-                square=float(np.sum(along**2 / share[known])),
+                square=sum_of(along**2 / share[known]),
                 freedom=int(np.count_nonzero(known)),
             )
         )
@@ -136,10 +138,10 @@ def _checked(stated_um: float, group: Sequence[MountingOffset]) -> ScatterCheck:
     if freedom == 0:
         return ScatterCheck(stated_um, None, None, len(group), None, ScatterVerdict.UNTOLD)
     tail = (1.0 - CONFIDENCE) / 2.0
-    low, high = (stated_um * float(np.sqrt(square / chdtri(freedom, p))) for p in (tail, 1.0 - tail))
+    low, high = (stated_um * sqrt(square / chdtri(freedom, p)) for p in (tail, 1.0 - tail))
     within = ScatterVerdict.LESS if high < stated_um else ScatterVerdict.AS_STATED
     finding = ScatterVerdict.MORE if low > stated_um else within
-    found_um = stated_um * float(np.sqrt(square / freedom))
+    found_um = stated_um * sqrt(square / freedom)
     return ScatterCheck(stated_um, found_um, (low, high), len(group), finding is not ScatterVerdict.MORE, finding)
 
 
@@ -150,7 +152,7 @@ def fine_noise_mm(calibration: Calibration) -> float:
         rough = residual - smooth(residual, np.radians(observation.raw.phi_deg))
         square += float(rough @ rough)
         count += max(len(rough) - (2 * LOW + 1), 1)
-    return float(np.sqrt(square / count))
+    return sqrt(square / count)
 
 
 SIGNIFICANT = 1e-8

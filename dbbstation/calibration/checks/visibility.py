@@ -7,12 +7,14 @@ directions.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import computed_field
 
 from dbbstation.calibration.fit.directions import in_words
+from dbbstation.computing.arrays import place_of_largest, range_of, sum_of
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.square_root import complement, lost_directions, spread_over
 
@@ -116,11 +118,11 @@ def indices(singular: Floats, readings: int) -> Indices:
     """Return O1 to O5 of positive singular values in descending order, shape (L,)."""
     greatest, least = float(singular[0]), float(singular[-1])
     return Indices(
-        o1=float(np.exp(np.mean(np.log(singular)))) / float(np.sqrt(readings)),
+        o1=float(np.exp(np.mean(np.log(singular)))) / sqrt(readings),
         o2=least / greatest,
         o3=least,
         o4=least**2 / greatest,
-        o5=1.0 / float(np.sum(1.0 / singular)),
+        o5=1.0 / sum_of(1.0 / singular),
     )
 
 
@@ -134,7 +136,7 @@ def _weakest(calibration: Calibration) -> tuple[WeakDirection, ...]:
     for k in range(len(fitted) - 1, len(fitted) - 1 - min(WEAKEST, calibration.parameters_identified), -1):
         moved = scale * axes[:, k]
         # Units differ, so compare parameters in units of their usual sizes.
-        most = int(np.argmax(np.abs(axes[:, k])))
+        most = place_of_largest(np.abs(axes[:, k]))
         size, unit = float(np.sqrt(variance[k]) * np.abs(moved[most])), units[fitted[most]]
         size, unit = (1e3 * size, "µm") if unit == "mm" else (size, unit)
         found.append(WeakDirection(in_words(calibration.layout, axes[None, :, k])[0], size, unit))
@@ -175,7 +177,7 @@ def _leverage(calibration: Calibration, fitted: Integers) -> dict[str, float]:
         rows = spread_over(blocks, np.concatenate([own, common]))[:, :-1] / noise
         triangle = np.asarray(np.linalg.qr(np.vstack([priors, rows]), mode="r"), dtype=np.float64)
         root = triangle[len(own) :, len(own) :]
-        worth[test] = float(np.sum((root @ covariance) * root))
+        worth[test] = sum_of((root @ covariance) * root)
     return worth
 
 
@@ -234,7 +236,7 @@ def gaps(calibration: Calibration) -> tuple[str, ...]:
     if any(not run.setup.place_known for run in runs):
         return ("balls put up under the spindle say nothing of the machine's place and tilt on the table",)
     found = []
-    if lost > 1 and float(np.ptp([run.raw.circle.ball_mm[2] for run in runs])) < APART_MM:
+    if lost > 1 and range_of([run.raw.circle.ball_mm[2] for run in runs]) < APART_MM:
         found.append("the balls of all tests stand at one height: add tests on a longer holder, at two more levels")
     if lost > 1 and float(np.ptp([run.raw.circle.tilt_deg for run in runs], axis=0).max()) < TILTED_DEG:
         found.append("all tests have one orientation: add tests with the platform tilted by 10 degrees or more")

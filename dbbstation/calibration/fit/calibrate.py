@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
+from math import sqrt
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
@@ -265,7 +266,7 @@ def _approached(
 
 
 def _rms_mm(left: Sequence[Floats]) -> float:
-    return float(np.sqrt(sum(float(one @ one) for one in left) / sum(map(len, left))))
+    return sqrt(sum(float(one @ one) for one in left) / sum(map(len, left)))
 
 
 def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> Floats:
@@ -392,7 +393,7 @@ def _settled(blocks: Sequence[Block], layout: Layout, noise: Noise, held: Floats
         solution = solve(blocks, layout.known, sigma * np.sqrt(noise.correlation_samples), held)
         square = (solution.chi2 - solution.stated_chi2) * sigma**2 * noise.correlation_samples
         spent = solution.freedom_used * noise.correlation_samples  # smooth columns absorb slow noise
-        sigma = float(np.sqrt(max(square, 0.0) / max(count - spent, 1.0)))
+        sigma = sqrt(max(square, 0.0) / max(count - spent, 1.0))
         sigma = max(sigma, SMALLEST_NOISE_MM)
     return solution, Noise(sigma, noise.correlation_samples)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from scipy.linalg import qr
 
+from dbbstation.computing.arrays import place_of_largest
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.triangle import ROUNDING
 from dbbstation.machine.geometry import STRUTS
@@ -171,7 +172,7 @@ def prescribed(layout: Layout, lost: Floats, wanted: Sequence[Name]) -> Floats:
 def names_of(layout: Layout, held: Floats) -> tuple[Name, ...]:
     """Return parameters that unit rows, shape (h, f), hold."""
     fitted = _fitted(layout)
-    return tuple(fitted[int(np.argmax(np.abs(row)))] for row in held)
+    return tuple(fitted[place_of_largest(np.abs(row))] for row in held)
 
 
 def _fitted(layout: Layout) -> list[Name]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from enum import StrEnum
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -112,11 +113,11 @@ def _check_not_centred(observations: Sequence[Observation]) -> None:
     if not observations:
         return
     seen = [figures(observation.raw) for observation in observations]
-    off = float(np.sqrt(np.mean([np.square(circle.centre_mm) for circle in seen])))
+    off = sqrt(np.mean([np.square(circle.centre_mm) for circle in seen]))
     bent = np.median([circle.circularity_um for circle in seen])
     setups = [observation.setup for observation in observations]
     stated = np.mean([np.mean(s.mounting_repeatability_mm) ** 2 + s.ball_uncertainty_mm**2 for s in setups])
-    limit = max(CENTRED_MM, CENTRED_SHARE * float(np.sqrt(stated)))
+    limit = max(CENTRED_MM, CENTRED_SHARE * sqrt(stated))
     if off < limit and bent > LEAST_CIRCULARITY_UM:
         raise CalibrationError(
             f"the centres of the {len(seen)} circles lie within {1e3 * off:.2g} µm rms of the fixed balls, closer than any "

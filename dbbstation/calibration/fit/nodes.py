@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import norm_of
 from dbbstation.inference.square_root import compress
 from dbbstation.plan.plan import FULL_TURN_DEG
 
@@ -138,7 +139,7 @@ def nodes_of(run: Observation) -> RunNodes | None:
         coarse=replace(run, raw=nodes, finer=None),
         roots=np.ascontiguousarray(triangle[:, :-1, :-1]),
         seen=np.ascontiguousarray(triangle[:, :-1, -1]),
-        unseen=float(np.linalg.norm(triangle[:, -1, -1])),
+        unseen=norm_of(triangle[:, -1, -1]),
     )
 
 

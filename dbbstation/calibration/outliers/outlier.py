@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from math import sqrt
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -92,7 +93,7 @@ def without_shift(observation: Observation, residual: Floats) -> Floats:
 
 def rms_um(residual: Floats) -> float:
     """Return the root mean square [µm] of a residual [mm]."""
-    return 1e3 * float(np.sqrt(np.mean(residual**2)))
+    return 1e3 * sqrt(np.mean(residual**2))
 
 
 def _harmonics(observation: Observation) -> Floats:

@@ -21,6 +21,7 @@ from dbbstation.calibration.outliers.outlier import (
     without_shift,
 )
 from dbbstation.calibration.outliers.stray_balls import ball_moved, off_its_place
+from dbbstation.computing.arrays import median_of, place_of_largest
 from dbbstation.inference.square_root import chi2_without
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def _strange_test(calibration: Calibration) -> list[int]:
 
 def _strange_run(calibration: Calibration) -> list[int]:
     rest = _rests_um(calibration)
-    worst = int(np.argmax(rest))
+    worst = place_of_largest(rest)
     return [worst] if rest[worst] > _strange_from_um(rest) else []
 
 
@@ -87,7 +88,7 @@ def _rests_um(calibration: Calibration) -> Floats:
 
 
 def _strange_from_um(rests_um: Floats) -> float:
-    return max(STANDS_OUT * float(np.median(rests_um)), LEAST_UM)
+    return max(STANDS_OUT * median_of(rests_um), LEAST_UM)
 
 
 def in_place_after_all(
@@ -161,7 +162,7 @@ def _step(residual: Floats) -> tuple[float, int]:
     total = np.cumsum(residual)
     difference = (total[-1] - total[at - 1]) / (count - at) - total[at - 1] / at
     weight = np.sqrt(at * (count - at))
-    k = int(np.argmax(np.abs(difference) * weight))
+    k = place_of_largest(np.abs(difference) * weight)
     return float(difference[k]), int(at[k])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.special import chdtri, ndtr
 
 from dbbstation.calibration.checks.scatter import UNKNOWN_MM, MountingOffset, seats_of
 from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Outlier, OutlierKind, left_of, shift_of
+from dbbstation.computing.arrays import hypot_of, median_of, place_of_largest
 from dbbstation.errors import CalibrationError
 from dbbstation.plan.bar import UNKNOWN_BAR_MM
 
@@ -44,7 +46,7 @@ def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) 
     again = fit(apart)
     seats = {seat.mounting: seat for seat in seats_of(again)}
     shift = seats[own.setup.mounting].shift_mm - seats[others[0].setup.mounting].shift_mm
-    size = 1e3 * float(np.hypot(*shift[:2]))
+    size = 1e3 * hypot_of(*shift[:2])
     text = (
         f"the ball of test {run.test} moved by {_towards(shift)} between run {run.label} and {others[0].label}: "
         "holder or cup loose, or touched"
@@ -56,8 +58,8 @@ def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) 
 def _moved_in(calibration: Calibration) -> int | None:
     shifts = np.array([shift_of(o, r) for o, r in left_of(calibration)])
     away = np.hypot(*shifts.T)
-    worst = int(np.argmax(away))
-    limit = max(STANDS_OUT * float(np.median(away)), 1e-3 * LEAST_UM)
+    worst = place_of_largest(away)
+    limit = max(STANDS_OUT * median_of(away), 1e-3 * LEAST_UM)
     return worst if away[worst] > limit else None
 
 
@@ -68,7 +70,7 @@ def off_its_place(fit: Fit, calibration: Calibration, runs: Sequence[Observation
         return None
     # By chance half of the values exceed the median; missing physics scatters all balls, so the limit grows with the
     # median.
-    usual = max(1.0, float(np.median([seat.square / float(chdtri(seat.freedom, 0.5)) for seat in seats])))
+    usual = max(1.0, median_of([seat.square / float(chdtri(seat.freedom, 0.5)) for seat in seats]))
     worst = max(seats, key=lambda seat: seat.square / seat.freedom)
     beyond = float(chdtri(worst.freedom, _TAIL))
     if worst.square < usual * beyond or np.hypot(*worst.shift_mm[:2]) < 1e-3 * LEAST_UM:
@@ -146,7 +148,7 @@ def _ball(calibration: Calibration, kind: OutlierKind, freed: tuple[str, ...], w
     of = [run for run in calibration.observations if run.setup.mounting in freed]
     tests = ", ".join(dict.fromkeys(run.test for run in of))
     which = f"in run {of[0].label}" if "," in of[0].setup.mounting and len(of) == 1 else f"of test {tests}"
-    distance = float(np.hypot(*seat.shift_mm[:2]))
+    distance = hypot_of(*seat.shift_mm[:2])
     along = seat.shift_mm[:2] / max(distance, 1e-12)
     return Outlier(
         kind=kind,
@@ -156,7 +158,7 @@ def _ball(calibration: Calibration, kind: OutlierKind, freed: tuple[str, ...], w
         shift_um=_um(seat.shift_mm),
         text=f"the ball {which} stands {_towards(seat.shift_mm)} from its place{why}",
         sure=sure,
-        uncertainty_um=1e3 * float(np.sqrt(along @ seat.spread_mm2[:2, :2] @ along)),
+        uncertainty_um=1e3 * sqrt(along @ seat.spread_mm2[:2, :2] @ along),
         freed=freed,
         why=why,
     )
@@ -166,7 +168,7 @@ def _bar(calibration: Calibration, session: str, why: str) -> Outlier:
     terms = {(term.source.name, term.shared): term for term in calibration.layout.terms}
     column = terms["bar-offset", session].columns.start
     offset = 1e3 * float(calibration.x[column])
-    sigma = 1e3 * float(np.sqrt(calibration.solution.covariance[column, column]))
+    sigma = 1e3 * sqrt(calibration.solution.covariance[column, column])
     longer = "long" if offset > 0.0 else "short"
     return Outlier(
         kind=OutlierKind.BAR,
@@ -200,4 +202,4 @@ def _um(shift_mm: Floats) -> tuple[float, float, float]:
 
 def _towards(shift_mm: Floats) -> str:
     angle = np.degrees(np.arctan2(shift_mm[1], shift_mm[0])) % 360.0
-    return f"{1e3 * float(np.hypot(*shift_mm[:2])):.1f} µm towards {angle:.0f}°"
+    return f"{1e3 * hypot_of(*shift_mm[:2]):.1f} µm towards {angle:.0f}°"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import of_residuals
+from dbbstation.computing.arrays import hypot_of, range_of
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.facts import OfRun
 from dbbstation.facts.serialise import Absent
@@ -120,12 +122,12 @@ def _under(model: MachineModel, observations: Sequence[Observation]) -> tuple[li
 
     # Per run, because residuals need one number per sample.
     found, squares, counts = zip(*of_residuals(model, observations, of_run), strict=True)
-    return list(found), 1e3 * float(np.sqrt(sum(squares) / sum(counts)))
+    return list(found), 1e3 * sqrt(sum(squares) / sum(counts))
 
 
 def rms_um(residual_mm: Sequence[Floats]) -> float:
     """Return the root mean square over all runs [µm]."""
-    return 1e3 * float(np.sqrt(sum(float(one @ one) for one in residual_mm) / sum(map(len, residual_mm))))
+    return 1e3 * sqrt(sum(float(one @ one) for one in residual_mm) / sum(map(len, residual_mm)))
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,7 @@ def plane_figures(model: MachineModel, height_mm: float, corrected: MachineModel
     """
     heights = _error_mm(model, _RING, height_mm, corrected)[:, 2]
     sideways = _error_mm(model, _ALONG, height_mm, corrected)[:, 1]
-    return PlaneFigures(1e3 * float(np.ptp(heights)), 1e3 * float(np.ptp(sideways)))
+    return PlaneFigures(1e3 * range_of(heights), 1e3 * range_of(sideways))
 
 
 @with_one_thread
@@ -195,7 +197,7 @@ def _first_in_direction(observations: Sequence[Observation], k: int) -> int:
 
 def apart_um(a: CircleFigures, b: CircleFigures) -> float:
     """Return the distance of two centres [µm]."""
-    return 1e3 * float(np.hypot(a.centre_mm[0] - b.centre_mm[0], a.centre_mm[1] - b.centre_mm[1]))
+    return 1e3 * hypot_of(a.centre_mm[0] - b.centre_mm[0], a.centre_mm[1] - b.centre_mm[1])
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import range_of, sum_of
 from dbbstation.files.formats.mapping import ANGLE, DEVIATION, LENGTH, TIME, UNITS
 from dbbstation.plan.plan import FULL_TURN_DEG, USUAL_STROKE_MM
 from dbbstation.tasks.importing.travel import UnusableTravelError
@@ -58,7 +59,7 @@ def unlike_a_bar(
         lengths = numbers * UNITS[means][one] + (zero_mm if meant == DEVIATION else 0.0)
         off = float(np.max(np.abs(lengths - circle.bar_mm)))
         jump = float(np.max(np.abs(np.diff(lengths)), initial=0.0))
-        return float(np.ptp(lengths)) >= least_mm and off <= USUAL_STROKE_MM and jump <= LARGEST_JUMP_MM
+        return range_of(lengths) >= least_mm and off <= USUAL_STROKE_MM and jump <= LARGEST_JUMP_MM
 
     if len(numbers) == 0 or fits(unit):
         return None
@@ -77,7 +78,7 @@ def unlike_a_bar(
 
 def unlike_a_turn(theta_deg: Floats, unit: str) -> Implausible | None:
     """Return why angles contradict their unit, if another unit gives a turn, else None."""
-    span = float(np.ptp(theta_deg)) / UNITS[ANGLE][unit]
+    span = range_of(theta_deg) / UNITS[ANGLE][unit]
     turns = [
         f"{ANGLE}:{one}"
         for one, degrees in UNITS[ANGLE].items()
@@ -90,7 +91,7 @@ def unlike_a_turn(theta_deg: Floats, unit: str) -> Implausible | None:
 
 def unlike_the_feed(t_s: Floats, theta_deg: Floats, unit: str, circle: Circle) -> Implausible | None:
     """Return why times contradict their unit, if another unit gives the plan's feed, else None."""
-    turned = float(np.sum(np.abs(np.diff(np.unwrap(theta_deg, period=FULL_TURN_DEG)))))
+    turned = sum_of(np.abs(np.diff(np.unwrap(theta_deg, period=FULL_TURN_DEG))))
     took = float(t_s[-1] - t_s[0]) if len(t_s) > 1 else 0.0
     if took <= 0.0 or turned <= 0.0:
         return None
@@ -140,7 +141,7 @@ def check_units(
     if found is None:
         name = named[means]
         numbers = table.values[name][rows]
-        if len(numbers) > 1 and float(np.ptp(numbers)) == 0.0:
+        if len(numbers) > 1 and range_of(numbers) == 0.0:
             raise UnusableTravelError(
                 f"column {table.names.index(name) + 1}, {name}: it is {float(numbers[0]):g} in every row of the run, which is impossible for a gauge",
                 "the column may hold nominal values: name another with --columns, or accept the numbers with --trust unit",
@@ -177,7 +178,7 @@ def chance_of_centres(centres: Iterable[tuple[Ball, Sequence[Floats]]]) -> float
         variance = ball.uncertainty_mm**2 + ball.repeatability_mm**2
         if not ball.place_known or variance <= 0.0 or not found:
             continue
-        distance2 = float(np.sum(np.mean(found, axis=0) ** 2))
+        distance2 = sum_of(np.mean(found, axis=0) ** 2)
         logs.append(np.log(max(-np.expm1(-distance2 / (2.0 * variance)), np.finfo(float).tiny)))
     if not logs:
         return None

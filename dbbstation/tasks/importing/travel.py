@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.arrays import median_of, range_of, sum_of
 from dbbstation.plan.plan import FULL_TURN_DEG, Circle, Direction
 from dbbstation.trace.cut import LARGEST_GAP_DEG
 
@@ -54,7 +55,7 @@ class TravelledPath:
 
 def rises(angle_deg: Floats) -> bool:
     """Return whether angles grow, apart from steps of a turn."""
-    return float(np.sum(np.diff(_unwrapped(angle_deg)))) > 0.0
+    return sum_of(np.diff(_unwrapped(angle_deg))) > 0.0
 
 
 def machine_angles(angle_deg: Floats, said: AngleSchema, circle: Circle) -> Floats:
@@ -80,8 +81,8 @@ def machine_angles(angle_deg: Floats, said: AngleSchema, circle: Circle) -> Floa
 def unplanned_span_deg(theta_deg: Floats, circle: Circle) -> float | None:
     """Return the range of the angles [deg] if it is neither a turn nor the plan's path with overshoot, else None."""
     travelled = _unwrapped(theta_deg)
-    spacing = float(np.median(np.abs(np.diff(travelled)))) if len(travelled) > 1 else 0.0
-    span = float(np.ptp(travelled))
+    spacing = median_of(np.abs(np.diff(travelled))) if len(travelled) > 1 else 0.0
+    span = range_of(travelled)
     if span + spacing < FULL_TURN_DEG - LARGEST_GAP_DEG:
         return None  # no turn at all: cutting refuses it, and has more to say
     near = max(UNLIKE_SPAN_DEG, 2.0 * spacing)
@@ -170,7 +171,7 @@ def _turn(t_s: Floats, circle: Circle, computed: tuple[str, ...]) -> TravelledPa
 def _feed_note(t_s: Floats, theta_deg: Floats, circle: Circle) -> tuple[str, ...]:
     if len(t_s) < 2:  # noqa: PLR2004 - one sample has no speed
         return ()
-    turned = abs(float(np.sum(np.diff(_unwrapped(theta_deg)))))
+    turned = abs(sum_of(np.diff(_unwrapped(theta_deg))))
     feed = circle.feed_mm_min * turned / float(t_s[-1] - t_s[0]) / circle.turning_deg_s
     if abs(feed / circle.feed_mm_min - 1.0) <= UNLIKE_FEED:
         return ()

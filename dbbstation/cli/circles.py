@@ -51,8 +51,7 @@ def _print(result: CirclesResult, *, several: bool) -> None:
     rows: list[list[object]] = []
     titles = ["test", "dir", "n", *_titles(_OF_RUN), "step", "closure", "drift", "noise"]
     for run in result.runs:
-        name: list[object] = [run.session] if several else []
-        name += [run.test, run.direction, run.repeat]
+        name = [*([run.session] if several else []), *run.key]
         if isinstance(run, RunWithoutCircle):
             rows.append([*name, *["-"] * (len(head) + len(titles) - len(name))])
             continue
@@ -122,9 +121,7 @@ def _print_findings(runs: Sequence[CircleFiguresResult | RunWithoutCircle]) -> N
     found = [(run, finding) for run in runs for finding in run.findings or ()]
     rows: list[list[object]] = [
         [
-            run.test,
-            run.direction,
-            run.repeat,
+            *run.key,
             finding.name,
             _fixed(finding.value),
             _fixed(finding.limit),

@@ -56,9 +56,7 @@ def print_effects(effects: Sequence[CauseEffect]) -> None:
     echo("\ncircles as they would be if one cause were cured: G [µm]")
     circles = [
         [
-            run.test,
-            run.direction,
-            run.repeat,
+            *run.key,
             f"{run.measured_g_um:.1f}",
             *(f"{one.runs[k].cured_g_um:.1f}" for one in shown),
         ]

@@ -47,7 +47,7 @@ def _print_predicted(runs: Sequence[EvaluatedRun]) -> None:
             continue
         off = circular.predicted - circular.measured
         share = f"{100 * off / circular.measured:.0f}" if circular.measured else "-"
-        rows.append([run.test, run.direction, run.repeat, circular.measured, circular.predicted, off, share])
+        rows.append([*run.key, circular.measured, circular.predicted, off, share])
     echo("circular deviation G up to 30 undulations per revolution [µm]")
     print_table(["test", "dir", "n", "measured", "predicted", "difference", "%"], rows)
 

@@ -150,9 +150,7 @@ def print_runs(runs: Sequence[EvaluatedRun], *, low_passed: bool = False) -> Non
             bent = [run.circularity_30_upr_um.before, run.circularity_30_upr_um.after]
         rows.append(
             [
-                run.test,
-                run.direction,
-                run.repeat,
+                *run.key,
                 *(of.centre_deviation_um for of in both),
                 *(of.mean_radial_error_um for of in both),
                 *bent,

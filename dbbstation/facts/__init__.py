@@ -20,9 +20,8 @@ def picked(one: object, *names: str) -> dict[str, object]:
     return {name: getattr(one, name) for name in names}
 
 
-@dataclass(frozen=True)
-class OfRun:
-    """A fact about one run."""
+class NamedRun:
+    """What has a run's test, direction and repeat."""
 
     test: str
     direction: str
@@ -40,7 +39,16 @@ class OfRun:
 
 
 @dataclass(frozen=True)
-class OfRunInSession:
+class OfRun(NamedRun):
+    """A fact about one run."""
+
+    test: str
+    direction: str
+    repeat: int
+
+
+@dataclass(frozen=True)
+class OfRunInSession(NamedRun):
     """A fact about one run of one of several sessions."""
 
     session: str

@@ -48,11 +48,6 @@ class ToleratedCircle(OfRunInSession):
             return own
         return self.others.get((tolerance.figure, tolerance.upr))
 
-    @property
-    def key(self) -> tuple[str, str, int]:
-        """Return test, direction and repeat."""
-        return self.test, self.direction, self.repeat
-
 
 def tolerated_circles(
     circles: Iterable[MeasuredCircle], tolerances: Sequence[Tolerance] = ()
@@ -159,7 +154,7 @@ def held_tolerance(tolerance: Tolerance, circles: Iterable[ToleratedCircle], cov
     if sized:
         one, size = max(sized, key=lambda pair: pair[1].um)
         expanded_um = expanded_uncertainty(size.u_um, coverage_factor)
-        worst = WorstCircle(one.test, one.direction, one.repeat, size.um, expanded_um, size.why_not or None)
+        worst = WorstCircle(*one.key, size.um, expanded_um, size.why_not or None)
     return HeldTolerance(
         **stated(tolerance),
         filter=filter_words(tolerance),

@@ -257,9 +257,7 @@ def _low_passed(run: EvaluatedRun) -> tuple[float, float]:
 def _worst(tolerance: Tolerance, runs: Sequence[tuple[EvaluatedRun, CircleDeviations, float]]) -> WorstRun | None:
     named = [
         (
-            run.test,
-            run.direction,
-            run.repeat,
+            *run.key,
             {
                 CircleFigure.CIRCULAR_DEVIATION: circular_um,
                 CircleFigure.CENTRE_DEVIATION: of.centre_deviation_um,

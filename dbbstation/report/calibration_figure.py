@@ -129,22 +129,21 @@ def _centres(axes: Axes, tests: Sequence[CircleTest], k: int, title: str) -> Non
     shift = np.array([test.centre_um[k] for test in tests])
     longest = float(np.hypot(*shift.T).max()) or 1.0
     per_mm = longest / LONGEST_MM
-    scale: Any = {"angles": "xy", "scale_units": "xy", "scale": per_mm}
+    scale: Any = {"angles": "xy", "scale_units": "xy", "scale": per_mm, "width": 0.006}
     levels = sorted({round(float(z)) for z in where[:, 2]})
     for test, ball, arrow in zip(tests, where, shift, strict=True):
         colour = SET[levels.index(round(float(ball[2]))) % len(SET)]
         axes.plot(*ball[:2], "o", color="#999999", markersize=4.0, zorder=1)
-        axes.quiver(*ball[:2], *arrow, color=colour, angles="xy", scale_units="xy", scale=per_mm, width=0.006, zorder=2)
+        axes.quiver(*ball[:2], *arrow, color=colour, zorder=2, **scale)
         tip = ball[:2] + arrow / per_mm + 7.0 * arrow / max(hypot_of(*arrow), 1e-12)
-        axes.text(float(tip[0]), float(tip[1]), test.name, color=colour, ha="center", va="center", fontsize=8)
+        axes.text(tip[0], tip[1], test.name, color=colour, ha="center", va="center", fontsize=8)
     middle, half = (where.min(axis=0) + where.max(axis=0)) / 2.0, np.ptp(where, axis=0).max() / 2.0 + LONGEST_MM + 20.0
     axes.set_xlim(middle[0] - half, middle[0] + half)
     axes.set_ylim(middle[1] - half, middle[1] + 1.15 * half)
     axes.set_aspect("equal")
     labelled(axes, "X, mm", "Y, mm", f"centres off the balls, {title}")
-    key = step_of(longest)
-    start = np.array([middle[0] - half + 8.0, middle[1] - half + 10.0])
-    axes.quiver(*start, key, 0.0, color="black", width=0.006, **scale)
+    key, start = step_of(longest), middle[:2] - half + np.array([8.0, 10.0])
+    axes.quiver(*start, key, 0.0, color="black", **scale)
     axes.text(start[0], start[1] + 5.0, f"{key:g} µm", fontsize=8, va="bottom")
     for colour, z in zip(SET, levels, strict=False):
         axes.plot([], [], color=colour, linewidth=2.0, label=f"Z {z:g} mm")

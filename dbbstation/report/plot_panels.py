@@ -55,22 +55,21 @@ def draw_polar(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn], reach_
     half = SIZE / 2.0
     axes.set_xlim(-half, half)
     axes.set_ylim(-half, half)
-    for ends in (((-half + 14, half - 14), (0, 0)), ((0, 0), (-half + 14, half - 14))):
-        axes.plot(*ends, color="#c4c4c4", linewidth=0.5)
-    for um in (-step_um, 0.0, step_um):
+    ends = (14 - half, half - 14)
+    for line in ((ends, (0, 0)), ((0, 0), ends)):
+        axes.plot(*line, color="#c4c4c4", linewidth=0.5)
+    divisions = (-step_um, 0.0, step_um)
+    for um in divisions:
         style: Any = {"color": "#c4c4c4", "linewidth": 0.5} if um else {"color": "#555555", "linewidth": 0.7}
         axes.add_patch(Ring((0.0, 0.0), CIRCLE + scale * um, fill=False, **style))
     for analysis, thin in found:
-        theta_deg, deviation = thinned(analysis.path.theta_deg, analysis.residual_um)
-        theta, radius = (
-            np.radians(np.append(theta_deg, theta_deg[0])),
-            CIRCLE + scale * np.append(deviation, deviation[0]),
-        )
+        closed = (np.append(line, line[0]) for line in thinned(analysis.path.theta_deg, analysis.residual_um))
+        theta, radius = np.radians(next(closed)), CIRCLE + scale * next(closed)
         axes.plot(radius * np.cos(theta), radius * np.sin(theta), **_style(analysis, thin=thin))
     units_per_in = SIZE / side
     _written(axes, half - 14, 0.07 * units_per_in, "X", ha="right")
     _written(axes, 0.1 * units_per_in, half - 14 - 0.05 * units_per_in, "Y", ha="left")
-    for um in (-step_um, 0.0, step_um):
+    for um in divisions:
         label = f"{um:+g}" if um else "0"
         # Below the path, to the right of the axis: the letters of the axes stand elsewhere.
         _written(axes, 0.05 * units_per_in, -CIRCLE - scale * um, label, ha="left")
@@ -107,7 +106,7 @@ def draw_spectrum(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) -> 
     """Draw the amplitudes of undulations, and the noise."""
     spectra = [(one.analysed, one.spectrum, thin) for one, thin in drawn]
     noise = [each.noise_um for _, each, _ in spectra if np.isfinite(each.noise_um)]
-    noise_um = sqrt(np.mean(np.square(noise))) if noise else float("nan")
+    noise_um = sqrt(np.mean(np.square(noise))) if noise else 0.0
     subtitle = f"noise alone {noise_um:.2g} µm, dotted" if noise else "noise not known: too few samples"
     axes = _chart(sheet, box, [name, subtitle], "amplitude, µm")
     least = 1e-4  # a tenth of what bars resolve; zero has no place on this scale
@@ -234,13 +233,10 @@ def draw_map(
         middle = np.array([put.left + 0.5 * put.width, put.bottom + 0.5 * put.height])
         if hypot_of(*(middle - ball)) > _FAR_IN + 0.5 * put.width:
             axes.plot(*np.array([ball, middle]).T, color="#999999", linewidth=0.4, zorder=0)
-        axes.text(
-            float(middle[0]), float(middle[1]), label, ha="center", va="center", fontsize=TEXT_PT, parse_math=False
-        )
+        axes.text(middle[0], middle[1], label, ha="center", va="center", fontsize=TEXT_PT, parse_math=False)
 
 
 def _arrow(axes: Axes, tail: np.ndarray, along: np.ndarray, colour: str) -> None:
-    (x, y), (tip_x, tip_y) = tail, tail + along
     style = {
         "arrowstyle": "-|>",
         "color": colour,
@@ -249,7 +245,7 @@ def _arrow(axes: Axes, tail: np.ndarray, along: np.ndarray, colour: str) -> None
         "shrinkB": 0.0,
         "mutation_scale": 6,
     }
-    axes.annotate("", xy=(float(tip_x), float(tip_y)), xytext=(float(x), float(y)), arrowprops=style)
+    axes.annotate("", xy=tuple(tail + along), xytext=tuple(tail), arrowprops=style)
 
 
 def _centres_um(circles: Sequence[MeasuredCircle]) -> dict[str, np.ndarray]:
@@ -268,4 +264,5 @@ def _places(area: Box, balls_mm: np.ndarray) -> np.ndarray:
 
 
 def _around(place: np.ndarray, half: float) -> Box:
-    return Box(float(place[0]) - half, float(place[1]) - half, 2.0 * half, 2.0 * half)
+    x, y = place
+    return Box(x - half, y - half, 2.0 * half, 2.0 * half)

@@ -90,12 +90,12 @@ class TraceView(Widget):
         if fresh:
             self._scale_um = SMALLEST_SCALE_UM
         beneath = dict(beneath or {})
-        others = {way: id(one) for way, one in beneath.items()} != {way: id(one) for way, one in self._beneath.items()}
+        before, after = ({way: id(one) for way, one in each.items()} for each in (self._beneath, beneath))
         self._circle, self._traces, self._head, self._beneath = circle, dict(traces), head, beneath
         drawn = (*traces.values(), *beneath.values())
         scale = grown_scale_um(self._scale_um, max((trace.largest_um for trace in drawn), default=0.0))
         size = Size(self.size.width, self.size.height - 2)
-        if fresh or others or scale != self._scale_um or size != (self._dial.columns, self._dial.rows):
+        if fresh or before != after or scale != self._scale_um or size != (self._dial.columns, self._dial.rows):
             self._begin(size, scale)
         self._extend()
         self._compose_cells()

@@ -70,8 +70,9 @@ def json_text(data: Mapping[str, object], indent: int | None = None) -> str:
 def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Print rows under titles, numbers aligned right, texts left."""
     texts = [[_text(cell) for cell in row] for row in rows]
-    numeric = [all(_is_number(row[k]) for row in texts if row[k]) for k in range(len(titles))]
-    widths = [max(len(title), *(len(row[k]) for row in texts), 0) for k, title in enumerate(titles)]
+    columns = list(zip(titles, *texts, strict=True))
+    numeric = [all(_is_number(text) for text in column[1:] if text) for column in columns]
+    widths = [max(map(len, column)) for column in columns]
     for row in [list(titles), *texts]:
         cells = [c.rjust(w) if n else c.ljust(w) for c, w, n in zip(row, widths, numeric, strict=True)]
         echo("  ".join(cells).rstrip())

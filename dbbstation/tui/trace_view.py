@@ -145,29 +145,29 @@ class TraceView(Widget):
             self.refresh(Region(0, 0, self.size.width, 1))
 
     def _letter(self, codes: NDArray[np.uint32], members: NDArray[np.uint8]) -> None:
+        def write(text: str, row: int, column: int) -> None:
+            text = text[: max(self._dial.columns - column, 0)]
+            codes[row, column : column + len(text)] = [ord(letter) for letter in text]
+            members[row, column : column + len(text)] = _LABEL
+
         rim = NOMINAL_SHARE + BAND_SHARE
-        self._write(codes, members, "X", *self._dial.cell(0.0, 1.05))
-        self._write(codes, members, "Y", *self._dial.cell(90.0, 1.05))
+        write("X", *self._dial.cell(0.0, 1.05))
+        write("Y", *self._dial.cell(90.0, 1.05))
         ring = f"+{self._scale_um:g} µm"
         row, column = self._dial.cell(45.0, rim)
-        self._write(codes, members, ring, row, min(column + 1, max(self._dial.columns - len(ring), 0)))
-        self._write(codes, members, "0", *self._dial.cell(135.0, NOMINAL_SHARE))
-        self._write(codes, members, f"-{self._scale_um:g}", *self._dial.cell(135.0, NOMINAL_SHARE - BAND_SHARE))
+        write(ring, row, min(column + 1, max(self._dial.columns - len(ring), 0)))
+        write("0", *self._dial.cell(135.0, NOMINAL_SHARE))
+        write(f"-{self._scale_um:g}", *self._dial.cell(135.0, NOMINAL_SHARE - BAND_SHARE))
         if self._circle is not None:
             word = "start"
             row, column = self._dial.cell(self._circle.start_deg - _START_OFFSET_DEG, 1.0)
-            self._write(codes, members, word, row, min(column, max(self._dial.columns - len(word), 0)))
+            write(word, row, min(column, max(self._dial.columns - len(word), 0)))
         trace = None if self._head is None else self._traces.get(self._head)
         if trace is not None and self._head is not None and len(trace):
             theta, deviation = float(trace.theta_deg[-1]), float(trace.deviation_um[-1])
             if np.isfinite(deviation):
                 cell = self._dial.cell(theta, share_of(deviation, self._scale_um))
-                self._write(codes, members, _HEADS[self._head], *cell)
-
-    def _write(self, codes: NDArray[np.uint32], members: NDArray[np.uint8], text: str, row: int, column: int) -> None:
-        text = text[: max(self._dial.columns - column, 0)]
-        codes[row, column : column + len(text)] = [ord(letter) for letter in text]
-        members[row, column : column + len(text)] = _LABEL
+                write(_HEADS[self._head], *cell)
 
     def on_resize(self) -> None:
         self.show(self._circle, self._traces, self._head, self._beneath)

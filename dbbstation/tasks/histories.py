@@ -54,15 +54,13 @@ def histories_in(
         InputError: no usable session; an unknown test.
         StoppedError: `stop` returned True; the index keeps the figures read so far.
     """
-    from dbbstation.tasks.session_figures import model_figures, session_figures
-
     folder = Path(folder)
     found = files_of(folder)
     with Kept(folder, begin_anew=rebuild) as kept:
         reading = _Reading(kept, counted, len(found.sessions) + len(found.models))
-        read = reading.every(found.sessions, SessionFigures, partial(_data, session_figures), _beside, _processes_for)
+        read = reading.every(found.sessions, SessionFigures, _session_data, _beside, _processes_for)
         sessions = [replace(one, name=_called(name)) for name, one in read.items()]
-        work = partial(_data, partial(model_figures, source_files=tuple(source_files)))
+        work = partial(_model_data, source_files=tuple(source_files))
         models = [
             replace(one, file=name)
             for name, one in reading.every(found.models, ModelFigures, work, lambda _model: source_files).items()
@@ -217,11 +215,26 @@ def _processes_for(sessions: Sequence[Path]) -> int:
     return min(os.cpu_count() or 1, len(sessions)) if runs >= RUNS_WORTH_PROCESSES else 1
 
 
-def _data(read: Callable[[Path], _Kind], path: Path) -> _Kind | _Unreadable:
+def _session_data(path: Path) -> SessionFigures | _Unreadable:
+    from dbbstation.tasks.session_figures import session_figures
+
     try:
-        return read(path)
+        return session_figures(path.parent)
     except (StationError, OSError) as error:
-        return _Unreadable(reason_of(error) if isinstance(error, OSError) else _first_of(error))
+        return _Unreadable(_why(error))
+
+
+def _model_data(path: Path, source_files: Sequence[Path]) -> ModelFigures | _Unreadable:
+    from dbbstation.tasks.session_figures import model_figures
+
+    try:
+        return model_figures(path, source_files)
+    except (StationError, OSError) as error:
+        return _Unreadable(_why(error))
+
+
+def _why(error: StationError | OSError) -> str:
+    return reason_of(error) if isinstance(error, OSError) else _first_of(error)
 
 
 def _called(name: str) -> str:

@@ -11,8 +11,8 @@ from dbbstation.station import events
 from dbbstation.station.commands import Accept, Command, Quit, Repeat
 from dbbstation.station.states import State
 
-WRONG = found(Name.FEED, 100.0, 10.0, "mm/min", "", "the feed", "feed 1100 of 1000 mm/min")
-SOUND = found(Name.FEED, 1.0, 10.0, "mm/min", "", "the feed")
+WRONG = found(Name.FEED, 100.0, 10.0, "", "the feed", "feed 1100 of 1000 mm/min")
+SOUND = found(Name.FEED, 1.0, 10.0, "", "the feed")
 
 
 def sent(typed: str, *, wrong: bool) -> list[Command]:

@@ -543,8 +543,8 @@ def test_the_session_before_is_drawn_dim_beneath_its_own_direction_and_test(monk
 
 def wrong() -> Happening:
     told = (
-        found(Name.OTHER_DIRECTION, 144.7, 3.2, "µm", "sound", "something moved"),
-        found(Name.FEED, 100.0, 10.0, "mm/min", "sound", "the feed", "feed 1100 of 1000 mm/min"),
+        found(Name.OTHER_DIRECTION, 144.7, 3.2, "sound", "something moved"),
+        found(Name.FEED, 100.0, 10.0, "sound", "the feed", "feed 1100 of 1000 mm/min"),
     )
     return Happening(findings=told).circle("t0", Direction.CCW)
 
@@ -569,7 +569,7 @@ def test_what_is_wrong_is_not_accepted_by_enter_and_for_a_reason_only() -> None:
     assert repeated == Repeat()
     assert accepted == Accept("the cause is known and does not touch what is wanted")
     # A sound one: Enter accepts it.
-    sound = (found(Name.CLOSURE, 0.1, 1.0, "µm", "", ""),)  # the rest is for later circles to show
+    sound = (found(Name.CLOSURE, 0.1, 1.0, "", ""),)  # the rest is for later circles to show
 
     async def enter(pilot: Pilot[None], _app: StationApp) -> None:
         await pilot.press("enter")

@@ -151,7 +151,7 @@ def test_the_answer_is_one_word_and_a_missing_circle_is_no_within(job_file: Path
 def test_four_screens_and_nothing_that_is_wrong_is_accepted(job_file: Path) -> None:
     front = Front(job_file.parent, Memory(job_file.parent / "state.json"))
     operated = read_operated(job_file)
-    wrong = (found(Name.FEED, 100.0, 10.0, "mm/min", "", "the feed", "feed 1100 of 1000 mm/min"),)
+    wrong = (found(Name.FEED, 100.0, 10.0, "", "the feed", "feed 1100 of 1000 mm/min"),)
     runner = Waits(Happening(findings=wrong).circle("t0", Direction.CCW).events)
 
     async def run() -> None:
@@ -207,7 +207,7 @@ def test_four_screens_and_nothing_that_is_wrong_is_accepted(job_file: Path) -> N
 
 
 def test_a_sound_circle_is_accepted_by_enter() -> None:
-    sound = (found(Name.CLOSURE, 0.1, 1.0, "µm", "", ""),)
+    sound = (found(Name.CLOSURE, 0.1, 1.0, "", ""),)
     runner = Waits(Happening(findings=sound).circle("t0", Direction.CCW).events)
     app = StationApp(Happening().shown(), runner, clock=lambda: 0.0)
 
@@ -243,7 +243,7 @@ def test_a_circle_that_cannot_be_told_has_a_key_of_its_own() -> None:
 
 @pytest.mark.parametrize("operated", [False, True])
 def test_a_second_run_of_a_test_and_direction_is_offered_in_place_of_the_first(*, operated: bool) -> None:
-    sound = (found(Name.CLOSURE, 0.1, 1.0, "µm", "", ""),)
+    sound = (found(Name.CLOSURE, 0.1, 1.0, "", ""),)
     happening = Happening(findings=sound).circle("t0", Direction.CCW).command(Accept())
     happening.command(GoTo("t0", Direction.CCW)).circle("t0", Direction.CCW)
     runner = Waits(happening.events)

@@ -48,9 +48,9 @@ def verdict() -> Happening:
 
 def findings() -> Happening:
     told = (
-        found(Name.NOISE, 0.31, 0.61, "µm", "sound", "noisy"),
+        found(Name.NOISE, 0.31, 0.61, "sound", "noisy"),
         undecided(Name.REPEAT, "there is no other run of this test"),
-        found(Name.CLOSURE, 4.1, 1.95, "µm", "sound", "the ends are 4.1 µm apart; was the ball touched?"),
+        found(Name.CLOSURE, 4.1, 1.95, "sound", "the ends are 4.1 µm apart; was the ball touched?"),
     )
     return Happening(findings=told).circle("t0", Direction.CCW)
 

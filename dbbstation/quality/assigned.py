@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from heapq import nlargest
 from itertools import combinations
-from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -66,35 +65,98 @@ class FormerSitting:
 _Changes = tuple[tuple[int, int], ...]
 """Pairs of run and label, for labels other than the planned one, in ascending order."""
 
+_Followed = tuple[_Changes, "Compared"]
+"""An assignment with the expectation that makes it most probable."""
 
-def effects_of(circles: Sequence[Planned], reference: FormerSitting | None = None) -> PlanEffects:
-    """Return effects on a plan's circles, relative to the previous session's readings."""
-    moved = circles if reference is None else reference.moved(circles)
-    return PlanEffects(moved, owns=1 if reference is None else 2)
+
+def effects_of(circles: Sequence[Planned], former: FormerSitting | None = None) -> tuple[PlanEffects, ...]:
+    """Return effects on a plan's circles relative to their expectation, then to the previous session's readings."""
+    moved = () if former is None else (PlanEffects(former.moved(circles), owns=2),)
+    return (PlanEffects(circles), *moved)
+
+
+class Compared:
+    """A session's runs compared with a plan's circles under one expectation.
+
+    Args:
+        before: the same without the last run; None if unknown.
+
+    Attributes:
+        planned: labels of the circles under which the runs were filed.
+        bounds: by assignment and changed runs, upper bounds of log densities with their other labels.
+    """
+
+    def __init__(self, effects: PlanEffects, runs: Sequence[Seen], before: Compared | None) -> None:
+        self.effects = effects
+        self._read = [effects.run(one) for one in runs]
+        self.planned = [one.planned for one in self._read]
+        self.bounds: dict[_Changes, dict[tuple[int, ...], Floats]] = {}
+        self._before = {} if before is None else before.bounds
+
+    def near(self, labels: Sequence[int]) -> NearAssignments:
+        """Return log densities near an assignment."""
+        return NearAssignments(self.effects, self._readings, self._information_of(labels), np.array(labels))
+
+    def most(self, base: _Changes, runs: Integers, labels: int) -> Floats:
+        """Return upper bounds of log densities near an assignment from before the last run; infinite if unknown.
+
+        Args:
+            runs: shape (m, k).
+            labels: number of alternatives, j.
+        """
+        known, unknown = self._before.get(base, {}), np.full(labels, np.inf)
+        # However well the last run is predicted, its reading scatters by its own part.
+        most = -self._read[-1].half_log_determinants[self.planned[-1]]
+        return most + np.array([known.get(tuple(each), unknown) for each in runs.tolist()])
+
+    def _information_of(self, labels: Sequence[int]) -> Floats:
+        """Return products of whitened effects and readings, summed over runs, shape (p + 1, p + 1)."""
+        found = self._information.copy()
+        for one, label, planned in zip(self._read, labels, self.planned, strict=True):
+            if label != planned:
+                found += one.product(label) - one.product(planned)
+        return found
+
+    @cached_property
+    def _information(self) -> Floats:
+        found = np.zeros_like(self._read[0].product(self.planned[0]))
+        for one, planned in zip(self._read, self.planned, strict=True):
+            found += one.product(planned)
+        return found
+
+    @cached_property
+    def _readings(self) -> Readings:
+        """Return the readings of all runs under every label."""
+        return Readings.of(self._read)
 
 
 class Assigned:
     """Joint decision on the circles that a session's runs show.
 
+    Each assignment counts under the expectation that makes it most probable: errors of usual sizes, or changes since
+    the previous session. A machine that was corrected since looks like neither its previous session nor a change.
+
     Args:
-        effects: on the plan's circles, relative to the same reference.
+        effects: on the plan's circles, for each expectation with equal prior probability.
         runs: the last one is new; `finding` decides its circle.
+        former: the previous session, to which the last of `effects` refers.
         before: the decision on earlier runs with the same effects; its bounds are used if only the last run is new.
     """
 
     def __init__(
         self,
-        effects: PlanEffects,
+        effects: Sequence[PlanEffects],
         runs: Sequence[Seen],
-        reference: FormerSitting | None = None,
+        former: FormerSitting | None = None,
         before: Assigned | None = None,
     ) -> None:
-        self.reference, self.effects, self.circles = reference, effects, effects.circles
+        self.former, self.effects, self.circles = former, effects, effects[0].circles
         self.runs = [one for one in runs if one.analysis is not None]
-        self.read = [self.effects.run(one) for one in self.runs]
-        self.planned = [one.planned for one in self.read]
-        self._bounds: dict[_Changes, dict[tuple[int, ...], Floats]] = {}
-        self._before = before._bounds if before is not None and before.runs == self.runs[:-1] else {}  # noqa: SLF001 - the same class
+        earlier: Sequence[Compared | None] = [None] * len(effects)
+        if before is not None and before.runs == self.runs[:-1]:
+            earlier = before.compared
+        self.compared: Sequence[Compared] = [Compared(each, self.runs, then) for each, then in zip(effects, earlier, strict=True)]
+        self.planned = self.compared[0].planned
 
     def odds(self, one: Seen) -> float:
         """Return the log odds against a run's planned circle."""
@@ -141,25 +203,26 @@ class Assigned:
     @cached_property
     def _looked_up(self) -> Known:
         known = Known(len(self.runs))
-        followed: set[_Changes] = set()
-        best: list[_Changes] = [()]
-        while any(changes not in followed for changes in best):
-            for changes in [each for each in best if each not in followed]:
-                followed.add(changes)
-                self._follow(changes, known)
+        followed: set[_Followed] = set()
+        best: list[_Followed] = [((), each) for each in self.compared]
+        while best:
+            near = [(changes, each, each.near(self._labels(changes))) for changes, each in best]
+            for changes, each, beside in near:
+                known.add(changes, beside.log - self._mistakes(changes), each)
+            for one in near:
+                self._follow(*one, known)
+            followed |= set(best)
             # Of k mistakes that repay k - 1 of their costs, one repays half of its own or more.
-            best = [changes for changes, log in known.best() if log >= known.planned - 0.5 * self.cost]
+            least = known.planned - 0.5 * self.cost
+            best = [(changes, by) for changes, (log, by) in known.best() if log >= least]
+            best = [each for each in best if each not in followed]
         return known
 
-    def _follow(self, base: _Changes, known: Known) -> None:
+    def _follow(self, base: _Changes, compared: Compared, beside: NearAssignments, known: Known) -> None:
         """Add assignments near a given one, the most probable first, until further ones cannot affect a decision."""
-        beside = NearAssignments(
-            self.effects, self.readings, self.information(labels := self._labels(base)), np.array(labels)
-        )
-        known.add(base, beside.log - self._mistakes(base))
         least = known.planned - max(self.cost, 2.0 * LOG_ODDS_LIMIT)
-        asked = [_Asked(self, base, beside, *each, least) for each in self._changes]
-        self._bounds[base] = {tuple(run): row for each in asked for run, row in each.bounds}
+        asked = [_Asked(self, compared, base, beside, *each, least) for each in self._changes]
+        compared.bounds[base] = {tuple(run): row for each in asked for run, row in each.bounds}
         while True:
             limits = _Limits.of(known, self.cost, len(self.runs) - 1)
             wanted = [each.wanted(limits) for each in asked]
@@ -171,19 +234,7 @@ class Assigned:
                 places = np.nonzero(most >= first)
                 for runs, instead, log in each.scored(places) if len(places[0]) else ():
                     changes = self._with(base, runs, instead)
-                    known.add(changes, log - self._mistakes(changes))
-
-    def bounds(self, base: _Changes, runs: Integers, labels: int) -> Floats:
-        """Return upper bounds of log densities near an assignment from before the last run; infinite if unknown.
-
-        Args:
-            runs: shape (m, k).
-            labels: number of alternatives, j.
-        """
-        known, unknown = self._before.get(base, {}), np.full(labels, np.inf)
-        # However well the last run is predicted, its reading scatters by its own part.
-        most = -self.read[-1].half_log_determinants[self.planned[-1]]
-        return most + np.array([known.get(tuple(each), unknown) for each in runs.tolist()])
+                    known.add(changes, log - self._mistakes(changes), compared)
 
     def _labels(self, changes: _Changes) -> list[int]:
         labels = dict(changes)
@@ -228,7 +279,7 @@ class Assigned:
 
     def _as_test(self, group: Sequence[int], test: str) -> list[int]:
         """Return labels for a group's runs, taken as runs of a test; empty if the plan lacks such a circle."""
-        labels = [self.effects.labels.get((test, self.runs[k].run.circle.direction)) for k in group]
+        labels = [self.effects[0].labels.get((test, self.runs[k].run.circle.direction)) for k in group]
         known = [label for label in labels if label is not None]
         return known if len(known) == len(labels) else []
 
@@ -267,39 +318,19 @@ class Assigned:
         same_way = label >= 0 and self.circles[label].circle.direction is self.runs[run].run.circle.direction
         return self.circles[label].test if same_way else ""
 
-    def information(self, labels: Sequence[int]) -> Floats:
-        """Return products of whitened effects and readings, summed over runs, shape (p + 1, p + 1)."""
-        found = self._information.copy()
-        for one, label, planned in zip(self.read, labels, self.planned, strict=True):
-            if label != planned:
-                found += one.product(label) - one.product(planned)
-        return found
-
-    @cached_property
-    def _information(self) -> Floats:
-        found = np.zeros_like(self.read[0].product(self.planned[0]))
-        for one, planned in zip(self.read, self.planned, strict=True):
-            found += one.product(planned)
-        return found
-
-    @cached_property
-    def readings(self) -> Readings:
-        """Return the readings of all runs under every label."""
-        return Readings.of(self.read)
-
     def since(self, one: Seen) -> Finding | None:
         """Return the finding on changes since the previous session; None without such a session."""
-        if self.reference is None:
+        if self.former is None:
             return None
-        label = self.planned[self.runs.index(one)]
-        off = read_um(one) - expected_um(self.circles[label])
-        session = self.effects.of_session[label]
-        covariance = self.effects.own[label] + one.u_um**2 * np.eye(COEFFICIENTS) + 2.0 * session @ session.T
+        effects, label = self.effects[-1], self.planned[self.runs.index(one)]
+        off = read_um(one) - expected_um(effects.circles[label])
+        session = effects.of_session[label]
+        covariance = effects.own[label] + one.u_um**2 * np.eye(COEFFICIENTS) + 2.0 * session @ session.T
         value, limit = norm_of(off), limit_along(covariance, off)
-        since = f"{self.reference.measured.day} {self.reference.measured:%B}"
+        since = f"{self.former.measured.day} {self.former.measured:%B}"
         verdict = FindingVerdict.GOOD if value <= limit else FindingVerdict.CANNOT_TELL
         word = "as" if value <= limit else "changed since"
-        stated = f"{value:.1f} µm rms from session {self.reference.session}: {word} {since}"
+        stated = f"{value:.1f} µm rms from session {self.former.session}: {word} {since}"
         return Finding(Name.SINCE, value, limit, "µm", verdict, stated)
 
 
@@ -313,6 +344,7 @@ class _Asked:
     def __init__(
         self,
         sitting: Assigned,
+        compared: Compared,
         base: _Changes,
         beside: NearAssignments,
         runs: Integers,
@@ -322,7 +354,7 @@ class _Asked:
         self._beside, self._base, self._planned = beside, dict(base), sitting.planned
         self._runs, self._instead = runs, instead
         self._fewest = sitting.fewest_mistakes(base, runs, instead)
-        self._bounds = sitting.bounds(base, runs, instead.shape[1])
+        self._bounds = compared.most(base, runs, instead.shape[1])
         asked = np.flatnonzero((self._bounds - self._fewest >= least).any(axis=1))
         self._logs = np.full((len(SIZES), *self._bounds.shape), -np.inf)
         self._logs[:, asked] = beside.most(runs[asked], instead[asked], least + sitting.cost)
@@ -379,10 +411,10 @@ class _Limits:
     def of(cls, known: Known, cost: float, new: int) -> _Limits:
         """Return the limits that follow from known log posterior densities."""
         best, floor = known.best(), known.planned
-        followed = best[-1][1] if len(best) == WIDE else -np.inf
+        followed = _log(best[-1]) if len(best) == WIDE else -np.inf
         suspects = {run for changes in known.likely() for run, _ in changes}
         return cls(
-            max(floor - cost, min(followed, max(floor, best[0][1] - LOG_ODDS_LIMIT))),
+            max(floor - cost, min(followed, max(floor, _log(best[0]) - LOG_ODDS_LIMIT))),
             {run: known.kept[run] for run in suspects},
             max(known.changed[new], known.kept[new] - 2.0 * LOG_ODDS_LIMIT),
         )
@@ -397,19 +429,19 @@ class Known:
     """
 
     def __init__(self, runs: int) -> None:
-        self._logs: dict[_Changes, float] = {}
+        self._logs: dict[_Changes, tuple[float, Compared]] = {}
         self.kept, self.changed = np.full(runs, -np.inf), np.full(runs, -np.inf)
 
     @property
     def planned(self) -> float:
         """Return the log posterior density of the plan."""
-        return self._logs[()]
+        return self._logs[()][0]
 
-    def add(self, changes: _Changes, log: float) -> None:
-        """Add an assignment if it is not known."""
-        if changes in self._logs:
+    def add(self, changes: _Changes, log: float, by: Compared) -> None:
+        """Add an assignment under an expectation if none makes it more probable."""
+        if changes in self._logs and log <= self._logs[changes][0]:
             return
-        self._logs[changes] = log
+        self._logs[changes] = log, by
         runs = [run for run, _ in changes]
         changed = np.maximum(self.changed[runs], log)
         kept = self.kept[runs]
@@ -420,15 +452,19 @@ class Known:
         """Return the log odds against a run's planned circle."""
         return float(self.changed[run] - self.kept[run])
 
-    def best(self) -> list[tuple[_Changes, float]]:
+    def best(self) -> list[tuple[_Changes, tuple[float, Compared]]]:
         """Return the most probable assignments, in descending order."""
-        return nlargest(WIDE, self._logs.items(), key=itemgetter(1))
+        return nlargest(WIDE, self._logs.items(), key=_log)
 
     def likely(self) -> list[_Changes]:
         """Return assignments more probable than the plan, and nearly as probable as the best, in descending order."""
-        floor, least = self.planned, self.best()[0][1] - LOG_ODDS_LIMIT
-        found = [each for each in self._logs.items() if each[1] > floor and each[1] >= least]
-        return [changes for changes, _ in sorted(found, key=itemgetter(1), reverse=True)]
+        floor, least = self.planned, _log(self.best()[0]) - LOG_ODDS_LIMIT
+        found = [each for each in self._logs.items() if _log(each) > floor and _log(each) >= least]
+        return [changes for changes, _ in sorted(found, key=_log, reverse=True)]
+
+
+def _log(one: tuple[_Changes, tuple[float, Compared]]) -> float:
+    return one[1][0]
 
 
 _OTHERWISE = {

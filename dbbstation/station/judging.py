@@ -142,19 +142,19 @@ class RunJudge:
         known = {(one.test, one.circle.direction) for one in self._circles}
         if any((one.run.test, one.run.circle.direction) not in known for one in runs):
             return None
-        self._decided_before = Assigned(self._effects, runs, self._reference, self._decided_before)
+        self._decided_before = Assigned(self._effects, runs, self._former_sitting, self._decided_before)
         return self._decided_before
 
     @cached_property
-    def _effects(self) -> PlanEffects:
-        return effects_of(self._circles, self._reference)
+    def _effects(self) -> tuple[PlanEffects, ...]:
+        return effects_of(self._circles, self._former_sitting)
 
     @cached_property
     def _circles(self) -> tuple[Planned, ...]:
         return circles_of_plan(self._writer.session, self._model)
 
     @cached_property
-    def _reference(self) -> FormerSitting | None:
+    def _former_sitting(self) -> FormerSitting | None:
         former, read = self._former, {}
         if former is None:
             return None

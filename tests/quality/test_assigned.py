@@ -18,7 +18,7 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Direction
 from dbbstation.quality.assigned import WIDE, Assigned, FormerSitting, Known, effects_of
-from dbbstation.quality.beside import SIZES, NearAssignments, mean_of
+from dbbstation.quality.beside import SIZES, mean_of
 from dbbstation.quality.finding import FindingVerdict, Name, undecided
 from dbbstation.quality.knowledge import Run, seen
 from dbbstation.quality.plan_effects import BESIDE, ELSEWHERE, ELSEWHERE_UM, LARGER
@@ -121,6 +121,18 @@ def test_the_first_circle_alone_decides_nothing_and_a_session_before_decides_it(
     assert suspected(wrong) == {"low ccw 1": "it is the circle of high ccw"}
 
 
+def test_a_machine_that_was_corrected_since_the_session_before_has_no_suspect(sitting) -> None:
+    """Circles without errors are alike: all would be one circle, if the session before were all that is known."""
+    circles, runs = sitting
+    read = {(test, str(way)): read_um(one) for (test, way), one in runs.items()}
+    former = FormerSitting("monday", date(2026, 5, 12), read)
+    corrected, effects, before = list(measured(circles, None).values()), effects_of(circles, former), None
+    for count in range(1, 7):
+        before = Assigned(effects, corrected[:count], former, before)
+        assert suspected(before) == {}
+    assert suspected(Assigned(effects[1:], corrected, former))
+
+
 def test_two_tests_that_changed_places_are_found_behind_the_third(sitting) -> None:
     swapped = {(one, way): (other, way) for one, other in (("low", "side"), ("side", "low")) for way in (CCW, CW)}
     found = suspected(shown(sitting, swapped, 5))
@@ -158,7 +170,7 @@ def test_answers_are_those_of_all_assignments_written_out(sitting, instead) -> N
         written = shown(sitting, instead, count)
         written.__dict__["_looked_up"] = known = Known(count)
         for changes, log in every_score(written).items():
-            known.add(changes, log)
+            known.add(changes, log, written.compared[0])
         assert suspected(assigned) == suspected(written)
         one = assigned.runs[-1]
         for name in (Name.TEST, Name.DIRECTION):
@@ -197,14 +209,14 @@ def test_the_cholesky_score_is_the_normal_density(sitting) -> None:
     from scipy.special import logsumexp  # noqa: PLC0415
     from scipy.stats import multivariate_normal  # noqa: PLC0415
 
-    machine = np.vstack([assigned.effects.of_machine[k] for k in labels])
-    session = np.vstack([assigned.effects.of_session[k] for k in labels])
+    machine = np.vstack([assigned.effects[0].of_machine[k] for k in labels])
+    session = np.vstack([assigned.effects[0].of_session[k] for k in labels])
     off = np.concatenate([read_um(one) - read_um_expected(c) for one, c in zip(assigned.runs, circles, strict=True)])
     for size in SIZES:
         whole = size**2 * machine @ machine.T + session @ session.T
         for k, one in enumerate(assigned.runs):
             rows = slice(7 * k, 7 * k + 7)
-            whole[rows, rows] += assigned.effects.own[labels[k]] + one.u_um**2 * np.eye(7)
+            whole[rows, rows] += assigned.effects[0].own[labels[k]] + one.u_um**2 * np.eye(7)
         logs.append(multivariate_normal(np.zeros(len(off)), whole, allow_singular=True).logpdf(off))
     wanted = logsumexp(logs) - np.log(len(SIZES)) + 0.5 * len(off) * np.log(2.0 * np.pi)
     assert assigned._looked_up.planned == pytest.approx(wanted, abs=1e-3)
@@ -226,7 +238,9 @@ def test_bounds_from_before_a_run_change_no_decision(sitting, seed: int) -> None
             found, wanted = (one.finding(whole.runs[count - 1], undecided(name, "")) for one in (before, anew))
             assert found == wanted
         known = [
-            before.bounds(base, runs, labels.shape[1]) for base in before._bounds for runs, labels in before._changes
+            before.compared[0].most(base, runs, labels.shape[1])
+            for base in before.compared[0].bounds
+            for runs, labels in before._changes
         ]
         spared += sum(int(np.isfinite(each).sum()) for each in known)
     assert spared
@@ -237,7 +251,7 @@ def test_all_labels_at_once_score_as_each_under_the_whole_covariance(sitting) ->
     for given in ((), ((0, 2),)):
         assigned = shown(sitting, {}, 4)
         labels = assigned._labels(given)
-        beside = NearAssignments(assigned.effects, assigned.readings, assigned.information(labels), np.array(labels))
+        beside = assigned.compared[0].near(labels)
         assert beside.log == pytest.approx(log_density(assigned, labels), rel=1e-7, abs=1e-3)
         widths = set()
         for runs, instead in assigned._changes:
@@ -256,8 +270,8 @@ def test_all_labels_at_once_score_as_each_under_the_whole_covariance(sitting) ->
 def log_density(assigned: Assigned, labels: tuple[int, ...]) -> float:
     """Log density of all readings with all covariances written out."""
     count = len(assigned.runs)
-    machine = np.zeros((count, 7, assigned.effects.of_machine.shape[2]))
-    session = np.zeros((count, 7, assigned.effects.of_session.shape[2]))
+    machine = np.zeros((count, 7, assigned.effects[0].of_machine.shape[2]))
+    session = np.zeros((count, 7, assigned.effects[0].of_session.shape[2]))
     own, off = np.zeros((7 * count, 7 * count)), np.zeros((count, 7))
     for k, (one, label) in enumerate(zip(assigned.runs, labels, strict=True)):
         circle = assigned.planned[k] if label < 0 else label
@@ -265,9 +279,9 @@ def log_density(assigned: Assigned, labels: tuple[int, ...]) -> float:
         rows = slice(7 * k, 7 * k + 7)
         own[rows, rows] = ELSEWHERE_UM**2 * np.eye(7)
         if label != ELSEWHERE:
-            machine[k], session[k] = assigned.effects.of_machine[circle], assigned.effects.of_session[circle]
+            machine[k], session[k] = assigned.effects[0].of_machine[circle], assigned.effects[0].of_session[circle]
             more = {BESIDE: [0, 1, 0, 0, 1, 0, 0], LARGER: [1, 0, 0, 0, 0, 0, 0]}.get(label, [0] * 7)
-            own[rows, rows] = assigned.effects.own[circle] + one.u_um**2 * np.eye(7) + ELSEWHERE_UM**2 * np.diag(more)
+            own[rows, rows] = assigned.effects[0].own[circle] + one.u_um**2 * np.eye(7) + ELSEWHERE_UM**2 * np.diag(more)
     machine, session, off = machine.reshape(7 * count, -1), session.reshape(7 * count, -1), off.ravel()
     logs = []
     for size in SIZES:

@@ -155,7 +155,9 @@ class Assigned:
         earlier: Sequence[Compared | None] = [None] * len(effects)
         if before is not None and before.runs == self.runs[:-1]:
             earlier = before.compared
-        self.compared: Sequence[Compared] = [Compared(each, self.runs, then) for each, then in zip(effects, earlier, strict=True)]
+        self.compared: Sequence[Compared] = [
+            Compared(each, self.runs, then) for each, then in zip(effects, earlier, strict=True)
+        ]
         self.planned = self.compared[0].planned
 
     def odds(self, one: Seen) -> float:

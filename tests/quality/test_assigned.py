@@ -281,7 +281,9 @@ def log_density(assigned: Assigned, labels: tuple[int, ...]) -> float:
         if label != ELSEWHERE:
             machine[k], session[k] = assigned.effects[0].of_machine[circle], assigned.effects[0].of_session[circle]
             more = {BESIDE: [0, 1, 0, 0, 1, 0, 0], LARGER: [1, 0, 0, 0, 0, 0, 0]}.get(label, [0] * 7)
-            own[rows, rows] = assigned.effects[0].own[circle] + one.u_um**2 * np.eye(7) + ELSEWHERE_UM**2 * np.diag(more)
+            own[rows, rows] = (
+                assigned.effects[0].own[circle] + one.u_um**2 * np.eye(7) + ELSEWHERE_UM**2 * np.diag(more)
+            )
     machine, session, off = machine.reshape(7 * count, -1), session.reshape(7 * count, -1), off.ravel()
     logs = []
     for size in SIZES:

@@ -77,9 +77,11 @@ def fifteen(tmp_path_factory, errors) -> Path:
 
 @pytest.fixture(scope="session")
 def elsewhere(tmp_path_factory, errors) -> Path:
-    folder = tmp_path_factory.mktemp("recorded") / "elsewhere"
-    record(folder, seed=2, plan=subset(table_ii_plan(2, scatter_mm=3.0), "dhk"), mechanisms=[errors], rate_hz=10.0)
-    return folder
+    def make(folder: Path) -> None:
+        plan = subset(table_ii_plan(2, scatter_mm=3.0), "dhk")
+        record(folder / "elsewhere", seed=2, plan=plan, mechanisms=[errors], rate_hz=10.0)
+
+    return made_once(tmp_path_factory, "elsewhere", make) / "elsewhere"
 
 
 @pytest.fixture(scope="session")

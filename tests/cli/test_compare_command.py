@@ -17,6 +17,7 @@ from tests.cli.conftest import Spoilt
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
 
+pytestmark = pytest.mark.usefixtures("answers_kept")
 RUNS = [f"{test}-{direction}-1" for test in "agl" for direction in ("ccw", "cw")]
 
 

@@ -8,6 +8,8 @@ import pytest
 
 from dbbstation.cli import DONE, FAILED, USAGE
 
+pytestmark = pytest.mark.usefixtures("answers_kept")
+
 
 def drawn_twice(run, target, *arguments):
     outcome = run(*arguments, "--figure", target)

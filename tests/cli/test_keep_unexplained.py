@@ -9,6 +9,7 @@ import pytest
 
 from dbbstation.cli import FAILED
 from tests.plant.mechanisms.outsiders import OddGearWobble
+from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
 
@@ -17,7 +18,8 @@ def kept(tmp_path_factory, run):
     """A session with a wave of 66.7 mm in strut 3, what was printed, the model that keeps it, and the true machine."""
     folder = tmp_path_factory.mktemp("kept")
     wobble = OddGearWobble(strut=3, turns_per_screw_turn=0.15, amplitude_um=6.0)
-    truth = record(folder / "session", seed=51, mechanisms=[wobble], rate_hz=10.0)
+    plan = subset(table_ii_plan(51), EIGHT)
+    truth = record(folder / "session", seed=51, plan=plan, mechanisms=[wobble], rate_hz=10.0)
     model = folder / "kept.yaml"
     line = ("diagnose", folder / "session", "--sources", "backlash", "--out", model)
     outcome = run(*line)

@@ -12,6 +12,7 @@ from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import table_ii_plan
 from tests.plant.session import record
 
+pytestmark = pytest.mark.usefixtures("answers_kept")
 ERRORS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.1)
 
 

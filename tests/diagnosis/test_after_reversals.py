@@ -122,7 +122,7 @@ def test_a_bump_between_tests_that_balls_hide_is_not_ruled_out(tmp_path):
 def test_a_strut_that_sticks_and_slips_is_no_spike(tmp_path):
     """Jerks of 3 µm behind its reversals: an effect over the travel since then, of that strut, and no cause of the list."""
     stick = StickSlip((0.0, 3.0, 0.0, 0.0, 0.0, 0.0), jerks=5)
-    record(tmp_path / "s", seed=11, mechanisms=[KINEMATICS, stick], rate_hz=25.0)
+    record(tmp_path / "s", seed=11, plan=subset(table_ii_plan(11), EIGHT), mechanisms=[KINEMATICS, stick], rate_hz=25.0)
     found = diagnose_sessions([tmp_path / "s"], None, (), lambda _: None).diagnosis
     assert {str(one.verdict) for one in found.sources} <= {"ruled-out", "not-testable"}
     assert (found.unexplained.strut, found.unexplained.variable) == (2, "travel since its reversal")

@@ -24,6 +24,7 @@ from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.disturbances import WALK_STEP_S, WanderingBar
 from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
@@ -32,7 +33,6 @@ KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 OVER_TIME = ("thermal-struts", "thermal-frame", "spindle-growth", "bar-drift", "bar-scale", "jig-thermal", "backlash")
 """What a wander could be taken for, and what it could hide."""
 FEW = ("backlash", "gravity", "servo-lag", "reversal-spike")
-EIGHT = tuple("abdfhjkn")
 """Of what is interrupted: the rounds of a comparison are the same for few causes and for all."""
 
 
@@ -42,7 +42,10 @@ EIGHT = tuple("abdfhjkn")
 )
 def test_a_bar_that_wanders_is_a_wander_and_no_cause(tmp_path, candidates):
     walk = np.cumsum(np.random.default_rng(3).normal(0.0, 0.1 * np.sqrt(WALK_STEP_S), 14_000))
-    record(tmp_path / "s", seed=1508, mechanisms=[KINEMATICS, WanderingBar(walk_um=tuple(walk))], rate_hz=5.0)
+    plan = subset(table_ii_plan(1508), EIGHT)
+    record(
+        tmp_path / "s", seed=1508, plan=plan, mechanisms=[KINEMATICS, WanderingBar(walk_um=tuple(walk))], rate_hz=5.0
+    )
     found = diagnose_sessions([tmp_path / "s"], candidates, (), lambda _: None).diagnosis
     assert "identified" not in {str(source.verdict) for source in found.sources}
     assert found.unexplained.variable == "time wander of the reading"
@@ -80,7 +83,7 @@ def test_what_is_certain_is_said_whatever_ends_at_a_limit(recordings, monkeypatc
 
     monkeypatch.setattr(explain, "search", recorded)
     folder = recordings / "sessions" / "all-or-nothing" / session
-    found = diagnose_sessions([folder], None, (), lambda _: None).diagnosis
+    found = diagnose_sessions([folder], None, EIGHT, lambda _: None).diagnosis
     (best,) = [source for source in found.sources if str(source.verdict) == "identified"]
     assert best.name == cause
     assert law in {term.source.law for term in found.after.layout.terms}

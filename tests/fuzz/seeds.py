@@ -200,7 +200,7 @@ def _seeds() -> list[Seed]:
         *_archives(),
         Seed(
             "table",
-            {"t.csv": b"".join((FIXTURES / "tables" / "axis.csv").read_bytes().splitlines(keepends=True)[:90])},
+            {"t.csv": b"".join((FIXTURES / "tables" / "axis.csv").read_bytes().splitlines(keepends=True)[:45])},
             {
                 "mismatch t.csv --measured measured_mm --simulated simulated_mm --no-held-out": 4,
                 "mismatch t.csv --measured measured_mm --simulated simulated_mm --no-held-out --json --table out/t.csv": 1,

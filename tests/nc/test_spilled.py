@@ -121,10 +121,10 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="peak memory is in kilobytes on Linux")
 @pytest.mark.slow
 def test_memory_does_not_grow_with_the_program():
-    """Within a tenth; the rows, the texts and the sums of 300,000 blocks are 60 MB."""
+    """Within a tenth; the rows, the texts and the sums of 200,000 blocks are 40 MB."""
     machine = shipped_folder("fixtures") / "machines" / "reference.yaml"
     most = [
         int(subprocess.check_output([sys.executable, "-c", PEAK, str(blocks), str(machine)]))
-        for blocks in (60_000, 360_000)
+        for blocks in (40_000, 240_000)
     ]
     assert most[1] < 1.1 * most[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import subprocess
 import sys
@@ -13,6 +14,12 @@ from dbbstation.files.places import shipped_folder
 SMALL = shipped_folder("fixtures") / "sessions" / "small"
 
 
+@functools.cache
+def in_unicode(*command):
+    environment = {**os.environ, "PYTHONIOENCODING": "utf-8", "PYTHONUTF8": "0"}
+    return subprocess.run(command, env=environment, capture_output=True, check=False).stdout.decode("utf-8")
+
+
 @pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])
 @pytest.mark.parametrize("words", [("circles",), ("session", "list")])
 def test_every_console_gets_the_table(encoding, words):
@@ -22,8 +29,7 @@ def test_every_console_gets_the_table(encoding, words):
     done = subprocess.run(command, env=environment, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
     assert b"Traceback" not in done.stderr
-    plain = subprocess.run(command, env={**environment, "PYTHONIOENCODING": "utf-8"}, capture_output=True, check=False)
-    shown, wanted = done.stdout.decode("utf-8" if encoding == "ascii" else encoding), plain.stdout.decode("utf-8")
+    shown, wanted = done.stdout.decode("utf-8" if encoding == "ascii" else encoding), in_unicode(*command)
     assert len(shown.splitlines()) == len(wanted.splitlines())
     assert [letter for letter in wanted if letter.isascii()] == [
         letter for letter in shown if letter.isascii() and letter != "?"

@@ -27,7 +27,14 @@ PROGRAM = [sys.executable, "-m", "dbbstation"]
 BAR = ["--bar-length-mm", "150", "--bar-uncertainty-um", "0.5"]
 TURN_S = 400.0 / 360.0 * 2.0 * np.pi * 150.0 / (1000.0 / 60.0)
 """From feed-in to feed-out at the feed of the plan [s]."""
-HOG = "while True: pass"
+HOG = """
+import time
+while True:
+    until = time.monotonic() + 0.05
+    while time.monotonic() < until:
+        pass
+    time.sleep(0.05)
+"""
 
 
 @contextmanager

@@ -11,9 +11,9 @@ import pickle
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from dbbstation.files.inputs import note_input
+from dbbstation.files.inputs import input_book, note_input, note_read
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -31,6 +31,9 @@ OF_SESSIONS = (
 
 STUDIES = ("studies.concealed_gravity.concealed_gravity",)
 """Studies that a document shows and tests look at."""
+
+_Read: TypeAlias = tuple[dict[Path, str], set[Path]]
+"""Files that were read while an answer was computed: hashes of those that outputs name, and all."""
 
 TELLING = {"progress", "stop", "say"}
 """Arguments of a task by which it tells, and that are no part of what it is asked."""
@@ -68,7 +71,7 @@ def computed_once(factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, *t
         patch.setattr(task, _kept(getattr(import_module(module), name), of_the_run(factory)))
 
 
-_HERE: dict[Path, tuple[list[str], object]] = {}
+_HERE: dict[Path, tuple[list[str], object, _Read]] = {}
 """Answers that hold functions which were made on the way and cannot be written down: each worker computes them."""
 
 
@@ -83,30 +86,42 @@ def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
         asked = repr((task.__module__, task.__name__, _request(words), _request(wanted)))
         place = folder / f"{hashlib.sha256(asked.encode()).hexdigest()}.pickle"
         if place in _HERE:
-            return _told(_HERE[place][0], more, _HERE[place][1])
+            _note_read(_HERE[place][2])
+            return _told(*_HERE[place][:2], more)
         with alone(place):
             if not place.exists():
                 told: list[str] = []
-                answer = task(*words, **{**more, **({"say": told.append} if tells else {})})
+                with input_book() as book:
+                    answer = task(*words, **{**more, **({"say": told.append} if tells else {})})
+                read = dict(book._digests), book._read
+                _note_read(read)
                 try:
-                    place.write_bytes(pickle.dumps((told, answer)))
+                    place.write_bytes(pickle.dumps((told, answer, read)))
                 except (AttributeError, TypeError, pickle.PicklingError):
                     place.unlink(missing_ok=True)
-                    _HERE[place] = told, answer
-                    return _told(told, more, answer)
-        told, answer = pickle.loads(place.read_bytes())  # noqa: S301 - written above
+                    _HERE[place] = told, answer, read
+                    return _told(told, answer, more)
+        told, answer, read = pickle.loads(place.read_bytes())  # noqa: S301 - written above
+        _note_read(read)
         _note_files((*words, *wanted.values()))
-        return _told(told, more, answer)
+        return _told(told, answer, more)
 
     ask.kept_in = folder
     return ask
 
 
-def _told(told: list[str], more: dict[str, Any], answer: object) -> object:
+def _told(told: list[str], answer: object, more: dict[str, Any]) -> object:
     """A module that was imported meanwhile keeps the cached task, and may call it without `say`."""
     for text in told if "say" in more else ():
         more["say"](text)
     return answer
+
+
+def _note_read(read: _Read) -> None:
+    for path, digest in read[0].items():
+        note_input(path, digest)
+    for path in read[1]:
+        note_read(path)
 
 
 def _note_files(values: tuple[object, ...]) -> None:

@@ -22,7 +22,7 @@ from benchmarks.measuring import Row, show, timed  # isort: skip - sets up the e
 
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.diagnosed import default_candidates
 from dbbstation.tasks.load import Recorded, load_sessions

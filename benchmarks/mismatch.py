@@ -17,8 +17,8 @@ import numpy as np
 
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import Mismatch, find_mismatch
+from dbbstation.inference.channel import Kind, Variable
 from dbbstation.inference.forms import Spline
-from dbbstation.inference.variables import Kind, Variable
 
 SEED = 5
 ROWS, QUICK_ROWS, VARIABLES = 12_000, 1_200, 12

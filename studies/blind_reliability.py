@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.inference.verdict import ABSENT
+from dbbstation.inference.levels import ABSENT
 from studies.coverage import wilson
 
 if TYPE_CHECKING:

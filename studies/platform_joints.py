@@ -12,7 +12,7 @@ import numpy as np
 
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
 from dbbstation.diagnosis.effects import workspace
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Plan, PlannedTest
 from dbbstation.sources.contract import Fitted, Motion

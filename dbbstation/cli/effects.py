@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.findings import ForceLocation
     from dbbstation.diagnosis.findings import Location
     from dbbstation.inference.alternatives import Cancelling
-    from dbbstation.inference.levels import Levels
+    from dbbstation.inference.levels import Gains, Levels
     from dbbstation.inference.read_off import CauseFinding
-    from dbbstation.inference.verdict import Gains
     from dbbstation.results.mismatch import MismatchResult
     from dbbstation.results.simulator import PortTerm, SimulatorResult
 

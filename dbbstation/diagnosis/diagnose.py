@@ -15,28 +15,31 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.effects import workspace_error
 from dbbstation.diagnosis.explain import explain, without
 from dbbstation.diagnosis.findings import Diagnosis, Unexplained
-from dbbstation.diagnosis.limits import limits_of, shifts_between, where_left
 from dbbstation.diagnosis.locate import after_reversals, locations_of
 from dbbstation.diagnosis.next_test import next_tests
 from dbbstation.diagnosis.shapes import Follows
 from dbbstation.diagnosis.unexplained import curve_of, with_exact_wave
-from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
+from dbbstation.diagnosis.verdicts import circle_levels, judge, limits_of, outcome_of, shifts_between, where_left
 from dbbstation.errors import ModelError
 from dbbstation.inference.alternatives import EVEN, Alternatives, cancelling
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.chosen_anew import (
+from dbbstation.inference.folds import (
+    HeldOut,
     columns_of,
     gains_of_tests,
     groups_of_tests,
+    held_out,
+    in_turn,
+    numbered,
     rows_of_groups,
     selection_frequency,
+    widening,
 )
-from dbbstation.inference.folds import HeldOut, held_out, in_turn, numbered, widening
 from dbbstation.inference.harmonics import LOW
+from dbbstation.inference.levels import SURE
 from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.settle import BETTER
 from dbbstation.inference.square_root import solve
-from dbbstation.inference.verdict import SURE
 from dbbstation.sources.laws.temperature import not_given
 from dbbstation.trace.recording import averaged, means, sector_of
 
@@ -45,10 +48,10 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.explain import Explained, SettledCircles
-    from dbbstation.inference.chosen_anew import KnownGains
+    from dbbstation.inference.folds import KnownGains
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.model_comparison import Member
-    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.settle import Settled
     from dbbstation.inference.square_root import Solution
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation

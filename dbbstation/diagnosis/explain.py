@@ -20,9 +20,9 @@ from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of, named_already
 from dbbstation.inference.bounds import BOUNDS, CIRCLES
 from dbbstation.inference.hypotheses import Hypothesis, other_laws, search
+from dbbstation.inference.levels import SURE
 from dbbstation.inference.model_comparison import SCALES, all_columns
-from dbbstation.inference.settled import Outcome
-from dbbstation.inference.verdict import SURE
+from dbbstation.inference.settle import Outcome
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -225,7 +225,7 @@ class _Settling:
         if self._is_laid_out_better(settled):
             return False
         best = settled.best if self._fitted else loud(settled.best)
-        named = frozenset((m.name, m.variant.law) for m in best.members if m.cause.named)
+        named = _laws(best)
         if named == self._fitted or named in self._tried:
             done, self._likely = self._likely == BOUNDS.likely, BOUNDS.likely
             return done
@@ -332,12 +332,16 @@ def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> Settled
     return replace(settled, after=before, posterior=nothing, left=misfit_of(before, settled.noise))
 
 
+def _laws(hypothesis: Hypothesis) -> frozenset[tuple[str, str]]:
+    return frozenset((m.name, m.variant.law) for m in hypothesis.members if m.cause.named)
+
+
 def _steady(posterior: Posterior, fitted: frozenset[tuple[str, str]]) -> Hypothesis:
     top = posterior.best.log_posterior
     for hypothesis in posterior.hypotheses:
         if hypothesis.log_posterior < top - BOUNDS.close:  # exact fits would not change the decision
             break
-        if frozenset((m.name, m.variant.law) for m in hypothesis.members if m.cause.named) == fitted:
+        if _laws(hypothesis) == fitted:
             return hypothesis
     return posterior.best
 

@@ -11,18 +11,16 @@ from pydantic import Field, computed_field
 from dbbstation.diagnosis.shapes import Follows
 from dbbstation.facts.serialise import Absent, Kept, OrNull
 from dbbstation.facts.value import Value
-from dbbstation.inference.verdict import Acts, CatalogueFinding, Gains
+from dbbstation.inference.levels import Acts, CatalogueFinding, Gains
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.diagnosis.effects import WorkspaceError
     from dbbstation.inference.alternatives import Cancelling
-    from dbbstation.inference.chosen_anew import ChosenAnew
-    from dbbstation.inference.folds import HeldOut
+    from dbbstation.inference.folds import ChosenAnew, HeldOut
     from dbbstation.inference.harmonics import Misfit
-    from dbbstation.inference.levels import Levels
-    from dbbstation.inference.verdict import LimitReached
+    from dbbstation.inference.levels import Levels, LimitReached
 
 
 @dataclass(frozen=True, kw_only=True)

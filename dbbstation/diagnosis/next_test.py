@@ -14,9 +14,9 @@ from dbbstation.diagnosis.findings import NextTest
 from dbbstation.diagnosis.parts import amplitudes, by_amplitudes, by_terms
 from dbbstation.inference.alternatives import would_show
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.levels import Verdict
 from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.square_root import solve
-from dbbstation.inference.verdict import Verdict
 from dbbstation.machine.travel import is_within_travel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Circle, Direction
@@ -250,7 +250,7 @@ def next_tests(
 
 
 def propose(
-    could_be: ForeseenTests, asked: Sequence[tuple[ErrorSource, Variant]], noise_mm: float, most: int = BOUNDS.proposed
+    could_be: ForeseenTests, asked: Sequence[tuple[ErrorSource, Variant]], noise_mm: float
 ) -> tuple[NextTest, ...]:
     """Return the fewest tests that change a source's verdict or halve its uncertainty.
 
@@ -285,7 +285,7 @@ def propose(
     both_ways: dict[int, _Rows] = {}
     chosen: list[Proposal] = []
     sigmas = [_sigmas(covariance[own, own], variant)]
-    for _ in range(min(most, len(one_way))):
+    for _ in range(min(BOUNDS.proposed, len(one_way))):
         closer = sorted(one_way, key=lambda k: left(one_way[k]))[: BOUNDS.closer_look]
         for k in closer:
             both_ways.setdefault(k, seen(proposals[k], slice(None)))

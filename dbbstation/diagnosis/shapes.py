@@ -20,6 +20,7 @@ from dbbstation.inference.forms import (
     Walk,
     Wave,
 )
+from dbbstation.inference.triangle import products_of_rows
 from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 from dbbstation.machine.statics import Load, platform_weight, strut_tensions
 from dbbstation.sources.contract import Effect
@@ -175,7 +176,7 @@ class Shape:
         values, gain = self.followed(samples.values[self.variable]), self._gain(samples)
         if self.variable not in OF_STRUTS or self.strut is not None:
             curve = self.form.columns(values)
-            return (gain[:, :, None] * curve[:, None, :]).reshape(len(gain), -1)
+            return products_of_rows(gain, curve)
         return np.einsum("ni,nip->np", samples.gain[self.moves], self.form.columns(values))
 
     def by_strut(self, samples: Samples, amplitudes: Floats) -> tuple[Floats, int]:

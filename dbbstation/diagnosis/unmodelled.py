@@ -36,6 +36,7 @@ from dbbstation.inference.looks import Sums, bumps, peaks, steps
 from dbbstation.inference.model_comparison import Cause, Variant, all_columns
 from dbbstation.inference.patterns import FAMILY_ODDS
 from dbbstation.inference.square_root import free_directions, with_random
+from dbbstation.inference.triangle import products_of_rows
 from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 
 if TYPE_CHECKING:
@@ -160,12 +161,11 @@ class TemplateScan:
             return csr_array((weights, rows, ends), shape=(len(number), many)) @ samples
 
         at = added(values.reshape(many, -1)) / number[:, None]
-        products = (gain[:, :, None] * gain[:, None, :]).reshape(many, -1)
         return Sums(
             at=at[:, 0] if values.ndim == 1 else at,
             place=own - own[0],
             rest=added(gain * self._rest[:, None]),
-            gains=added(products).reshape(-1, directions, directions),
+            gains=added(products_of_rows(gain, gain)).reshape(-1, directions, directions),
             base=np.stack([added(self._base, gain[:, d]) for d in range(directions)], axis=1),
         )
 

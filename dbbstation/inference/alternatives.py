@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.levels import OUT, SURE
 from dbbstation.inference.triangle import ROUNDING, root
-from dbbstation.inference.verdict import OUT, SURE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
-    from dbbstation.inference.settled import Outcome, Settled
+    from dbbstation.inference.settle import Outcome, Settled
 
 
 EVEN = 0.5

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.channel import Law
+from dbbstation.inference.channel import TRAVELS, Kind, Law
 from dbbstation.inference.patterns import DISTINCT, TRANSITS, Family, log_odds, odds_of_driven, one_of
-from dbbstation.inference.variables import TRAVELS, Kind
 from dbbstation.laws.memory import lagging
 from dbbstation.laws.play import within
 from dbbstation.laws.time_skew import delayed
@@ -21,8 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from dbbstation.computing.arrays import Floats
+    from dbbstation.inference.channel import Variable
     from dbbstation.inference.patterns import Choices
-    from dbbstation.inference.variables import Variable
 
 
 DEPARTS = 0.1
@@ -291,7 +290,7 @@ def _with_width(
         parameters=(*(one for one, _, _ in amplitudes), width[0]),
         units=(*(unit for _, unit, _ in amplitudes), width[1]),
         grids=(grid,),
-        log_odds=log_odds(members) + float(np.log(0.5 * DEPARTS)) + odds_of_driven([variable]),
+        log_odds=_log_odds(members, variable),
         choices=choices if len(choices) > 1 else (),
         reach=size,
         family=family,
@@ -338,12 +337,16 @@ def _integral(
         plausible=np.full(2 + starts, size),
         parameters=("rate", "drift", *(f"start {k + 1}" for k in range(starts))),
         units=(f"{unit}/({variable.unit or variable.name} {time_unit})", f"{unit}/{time_unit}", *[unit] * starts),
-        log_odds=log_odds(members) + float(np.log(0.5 * DEPARTS)) + odds_of_driven([variable]),
+        log_odds=_log_odds(members, variable),
         zero_from=middle,
         reach=size,
         family=Family.INTEGRAL,
         variables=(variable,),
     )
+
+
+def _log_odds(members: int, *over: Variable) -> float:
+    return log_odds(members) + float(np.log(0.5 * DEPARTS)) + odds_of_driven(over)
 
 
 def _scaled(one: Variable, by: Variable, blocks: Sequence[slice], size: float, unit: str, members: int) -> Law:
@@ -356,7 +359,7 @@ def _scaled(one: Variable, by: Variable, blocks: Sequence[slice], size: float, u
         plausible=np.full(len(labels), size),
         parameters=("size per unit",) * len(labels),
         units=(f"{unit}/{by.unit}" if by.unit else unit,) * len(labels),
-        log_odds=log_odds(members) + float(np.log(0.5 * DEPARTS)) + odds_of_driven([one, by]),
+        log_odds=_log_odds(members, one, by),
         choices=one_of(labels),
         reach=size,
         family=Family.SCALED,

@@ -120,8 +120,7 @@ class Coloured:
     def _predictors(self) -> tuple[list[Floats], list[float]]:
         coefficients, left = [np.zeros(0)], [1.0]
         for partial in self.partial:
-            before = coefficients[-1]
-            coefficients.append(np.concatenate([before - partial * before[::-1], [partial]]))
+            coefficients.append(_longer(coefficients[-1], partial))
             left.append(left[-1] * (1.0 - partial**2))
         return coefficients, left
 
@@ -202,6 +201,11 @@ def _state(taps: Floats, before: Floats) -> Floats:
     return np.array([-(taps[k + 1 :] @ recent[: order - k]) for k in range(order)])
 
 
+def _longer(coefficients: Floats, partial: float) -> Floats:
+    """Return the predictor of the next order."""
+    return np.concatenate([coefficients - partial * coefficients[::-1], [partial]])
+
+
 def partial_autocorrelations(correlation: Floats) -> tuple[float, ...]:
     """Return partial autocorrelations [Levinson-Durbin recursion], without negligible last values."""
     coefficients, left, found = np.zeros(0), 1.0, []
@@ -212,7 +216,7 @@ def partial_autocorrelations(correlation: Floats) -> tuple[float, ...]:
         partial = float(np.clip(partial, -STEADY, STEADY))
         if left * (1.0 - partial**2) < LEAST_NEW**2:
             break
-        coefficients = np.concatenate([coefficients - partial * coefficients[::-1], [partial]])
+        coefficients = _longer(coefficients, partial)
         left *= 1.0 - partial**2
         found.append(partial)
     while found and abs(found[-1]) < NOTHING:

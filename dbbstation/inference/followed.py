@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.levels import RUN, TIME
+from dbbstation.inference.channel import Kind
+from dbbstation.inference.levels import RUN, SURE, TIME, DensityGains
 from dbbstation.inference.model_comparison import all_columns, belong_to
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.triangle import rms, squares
 from dbbstation.inference.uneven import log_student
-from dbbstation.inference.variables import Kind
-from dbbstation.inference.verdict import SURE, DensityGains
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.bank import Bank
     from dbbstation.inference.model_comparison import Cause
-    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.settle import Settled
 
 LEAST_ADDED = 0.02
 """Least probability that a variable adds to its class; less does not change figures of two digits."""

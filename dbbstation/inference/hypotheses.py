@@ -350,7 +350,11 @@ class _Search:
 
     def _settled(self, members: list[Member]) -> Hypothesis:
         many = len(members) > BOUNDS.many
-        single = [k for k, member in enumerate(members) if many and _single(member)]
+        single = [
+            k
+            for k, member in enumerate(members)
+            if many and len(member.cause.variants) == 1 and not len(member.variant.slack)
+        ]
         beside = _Beside(self.comparison, members)
         for _ in range(BOUNDS.sweeps if len(members) > 1 else 1):
             before, at_once = list(members), beside.each_of(members, single)
@@ -493,7 +497,3 @@ def other_laws(member: Member, wanted: Callable[[Variant], bool] = lambda _: Tru
         if variant.law != member.variant.law and wanted(variant):
             laws.setdefault(variant.law, []).append(variant)
     return [replace(member.cause, name=law, variants=tuple(some)) for law, some in laws.items()]
-
-
-def _single(member: Member) -> bool:
-    return len(member.cause.variants) == 1 and not len(member.variant.slack)

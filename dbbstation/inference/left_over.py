@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Floats, Integers
+    from dbbstation.inference.channel import Variable
     from dbbstation.inference.harmonics import Spectrum
-    from dbbstation.inference.settled import Settled
-    from dbbstation.inference.variables import Variable
+    from dbbstation.inference.settle import Settled
 
 
 SIGNIFICANT = 0.001

@@ -15,7 +15,7 @@ from scipy.special import fdtrc, logsumexp
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.channel import impossible
+from dbbstation.inference.channel import Kind, impossible
 from dbbstation.inference.coloured import FEWEST_INDEPENDENT, NOTHING
 from dbbstation.inference.followed import (
     VariableProbabilities,
@@ -30,7 +30,10 @@ from dbbstation.inference.levels import (
     JOINED,
     ONCE,
     RUN,
+    SURE,
+    SURELY,
     TIME,
+    DensityGains,
     Detectable,
     Followed,
     FollowsAnswer,
@@ -44,21 +47,17 @@ from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES, all
 from dbbstation.inference.patterns import CURVES, Family
 from dbbstation.inference.triangle import ROUNDING, left_by, norms, root, squares, triangle_of
 from dbbstation.inference.uneven import widening_of
-from dbbstation.inference.variables import Kind
-from dbbstation.inference.verdict import SURE, SURELY, DensityGains
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats
-    from dbbstation.inference.channel import Channel
-    from dbbstation.inference.chosen_anew import ChosenAnew, KnownGains
-    from dbbstation.inference.folds import HeldOutError
+    from dbbstation.inference.channel import Channel, Variable
+    from dbbstation.inference.folds import ChosenAnew, HeldOutError, KnownGains
     from dbbstation.inference.followed import ChosenWithoutParts, ClassGain, VariableClass
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.model_comparison import Cause, Member, Variant
-    from dbbstation.inference.settled import Settled
-    from dbbstation.inference.variables import Variable
+    from dbbstation.inference.settle import Settled
 
 
 def law_form(
@@ -237,6 +236,10 @@ def detectable(settled: Settled) -> tuple[Detectable, ...]:
         if key not in asked or bends > len(asked[key].variants[0].columns):
             asked[key] = cause
     found = [_over_variables(settled, key, cause) for key, cause in asked.items()]
+    return _least_first(found)
+
+
+def _least_first(found: list[Detectable]) -> tuple[Detectable, ...]:
     return tuple(sorted(found, key=lambda one: -np.inf if one.size is None else -one.size))
 
 
@@ -252,7 +255,7 @@ def detectable_causes(settled: Settled) -> tuple[Detectable, ...]:
         shown = np.diag(settled.comparison.beside((), variant.columns)) * settled.noise.innovation**2
         seen = float(variant.plausible**2 @ shown) / whole
         found.append(_detectable(settled, cause, variant, samples, seen, cause.name, laws[cause.name].confirm))
-    return tuple(sorted(found, key=lambda one: -np.inf if one.size is None else -one.size))
+    return _least_first(found)
 
 
 FORMS = (Family.CURVE, Family.LINEAR, Family.DRIFT, None)

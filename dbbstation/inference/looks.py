@@ -13,9 +13,9 @@ import numpy as np
 from scipy.fft import rfft
 
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.channel import Kind
 from dbbstation.inference.forms import HARMONICS, Bump, Form, Spline, StepForm, Wave
 from dbbstation.inference.patterns import Family, Pattern, log_odds
-from dbbstation.inference.variables import Kind
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
+    from dbbstation.inference.channel import Variable
     from dbbstation.inference.coloured import Left
-    from dbbstation.inference.variables import Variable
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from dbbstation.inference.channel import TRAVELS, Kind
 from dbbstation.inference.forms import Form, Power, SignForm, Spline, Walk, Wave
-from dbbstation.inference.variables import TRAVELS, Kind
+from dbbstation.inference.triangle import products_of_rows
 from dbbstation.laws.play import within
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.inference.variables import Variable
+    from dbbstation.inference.channel import Variable
 
 FAMILY_ODDS = float(np.log(0.1 / 0.9))
 """Log prior odds of a family of patterns, present in one recording of ten. All variables share them, and so do all
@@ -286,7 +287,7 @@ def _product(one: Variable, other: Variable) -> Pattern:
     lines = [v for v in (one, other) if not covers_turns(v)]
     if not lines:
         a, b = (turn(v, 1).columns(v.values) for v in waves)
-        return Pattern(Family.PRODUCT, (one, other), (a[:, :, None] * b[:, None, :]).reshape(len(a), -1))
+        return Pattern(Family.PRODUCT, (one, other), products_of_rows(a, b))
     wave = turn(waves[0], 1).columns(waves[0].values) if waves else np.ones((len(one.values), 1))
     columns, labels = [], []
     for zeros in product(ZEROS, repeat=len(lines)):

@@ -14,10 +14,10 @@ from dbbstation.facts.serialise import Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out, would_show
 from dbbstation.inference.bank import amplitudes_of
-from dbbstation.inference.channel import impossible, impossible_beside
+from dbbstation.inference.channel import Kind, impossible, impossible_beside
 from dbbstation.inference.folds import weighted_jackknife
 from dbbstation.inference.forms import HARMONICS
-from dbbstation.inference.levels import Said, VerdictsByLevel, ambiguous, open_to
+from dbbstation.inference.levels import ABSENT, Acts, Gains, Said, Verdict, VerdictsByLevel, ambiguous, open_to
 from dbbstation.inference.model_comparison import SCALES, amplitude_size, slices_of
 from dbbstation.inference.patterns import ZEROS, Family, covers_turns, zeros_text
 from dbbstation.inference.seen import IN_TIME
@@ -25,19 +25,16 @@ from dbbstation.inference.square_root import runs_of
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.triangle import rms, root
 from dbbstation.inference.uneven import widening_of
-from dbbstation.inference.variables import Kind
-from dbbstation.inference.verdict import ABSENT, Acts, Gains, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.inference.channel import Law
-    from dbbstation.inference.chosen_anew import ChosenAnew
-    from dbbstation.inference.folds import HeldOutError
+    from dbbstation.inference.folds import ChosenAnew, HeldOutError
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.model_comparison import Cause, Member, Variant
-    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.settle import Settled
     from dbbstation.inference.square_root import Solution
 
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.channel import Kind, Variable
 from dbbstation.inference.coloured import Fitting, Left, LeftBesideOthers
 from dbbstation.inference.looks import PLACED, looked_for, placed_better
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.stretches import refined, stretches
-from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:
     from collections.abc import Container, Sequence

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
+    from dbbstation.inference.channel import Variable
     from dbbstation.inference.coloured import Coloured, Left
-    from dbbstation.inference.variables import Variable
 
 SHORTEST = 3
 """Shortest stretch in rows; a single wrong value is no effect of the object."""

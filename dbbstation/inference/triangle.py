@@ -53,6 +53,11 @@ def left_by(columns: Floats, values: Floats, rcond: float = ROUNDING) -> Floats:
     return values - scaled @ np.linalg.lstsq(scaled, values, rcond=rcond)[0]
 
 
+def products_of_rows(one: Floats, other: Floats) -> Floats:
+    """Return all products of columns, row by row, shape (n, p q)."""
+    return (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
+
+
 def squares(values: Floats) -> float:
     """Return the sum of squares."""
     return float(np.sum(np.square(values)))

@@ -12,7 +12,7 @@ from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.calibration.reporting.residual_map import residual_map
 from dbbstation.computing.arrays import largest_size
 from dbbstation.diagnosis.shapes import EVERY, PULL, SIGNED, TOWARDS
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.plan.plan import Direction
 from dbbstation.report.drawing import (
     AFTER,

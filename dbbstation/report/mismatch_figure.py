@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.table.mismatch import Mismatch
-    from dbbstation.inference.variables import Variable
+    from dbbstation.inference.channel import Variable
 
 MOST_POINTS = 500
 """Greatest number of drawn points of a cloud: more points make a larger file and the same picture."""

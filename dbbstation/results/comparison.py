@@ -15,9 +15,8 @@ from dbbstation.facts import of_facts, picked
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import Cancelling
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.levels import Levels
+from dbbstation.inference.levels import Gains, Levels, Verdict
 from dbbstation.inference.read_off import Span
-from dbbstation.inference.verdict import Gains, Verdict
 from dbbstation.results.diagnosis import BeforeAfter
 from dbbstation.results.frame import Framed
 from dbbstation.results.levels_text import level_sentences

@@ -14,8 +14,7 @@ from dbbstation.diagnosis.findings import Location, NextTest, Shift, SourceFindi
 from dbbstation.facts import OfRun, of_facts
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import Cancelling
-from dbbstation.inference.levels import Levels
-from dbbstation.inference.verdict import Acts, LimitReached, Verdict
+from dbbstation.inference.levels import Acts, Levels, LimitReached, Verdict
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.results.calibration import WithModel
 from dbbstation.results.frame import ByName, Framed

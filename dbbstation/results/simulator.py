@@ -17,8 +17,7 @@ from dbbstation.facts.value import Value, finite
 from dbbstation.files.atomic import write_text
 from dbbstation.files.provenance import Provenance
 from dbbstation.inference.left_over import LeftOver
-from dbbstation.inference.levels import Levels
-from dbbstation.inference.verdict import Gains, Verdict
+from dbbstation.inference.levels import Gains, Levels, Verdict
 from dbbstation.results.frame import Framed
 from dbbstation.results.levels_text import level_sentences
 

@@ -17,8 +17,8 @@ from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.units import PLAIN, Meaning, meaning_of, stated_meaning
 from dbbstation.errors import MOST_FAULTS, ArgumentError, Faults, InputError, Problem, refuse
 from dbbstation.files.recordings.table_csv import TableFile, given_table, read_table
+from dbbstation.inference.channel import Kind, Variable
 from dbbstation.inference.triangle import left_by
-from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

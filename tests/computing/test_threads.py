@@ -17,7 +17,7 @@ from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.files.places import shipped_folder
-from dbbstation.inference.variables import Kind, Variable
+from dbbstation.inference.channel import Kind, Variable
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.tasks.load import load_sessions
 

@@ -10,8 +10,7 @@ from dbbstation.diagnosis.findings import Diagnosis, SourceFinding, Unexplained
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
 from dbbstation.inference.folds import HeldOut
-from dbbstation.inference.levels import DifferenceFound, Differs, Levels
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import DifferenceFound, Differs, Levels, Verdict
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import sources_named

@@ -11,9 +11,9 @@ from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis import diagnose as finished
 from dbbstation.diagnosis import explain
 from dbbstation.diagnosis.channel import CircleChannel
-from dbbstation.diagnosis.limits import limits_of_fit
 from dbbstation.diagnosis.shapes import ranges, samples_of, shapes
 from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
+from dbbstation.diagnosis.verdicts import limits_of_fit
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import search
 from dbbstation.sources.contract import Parameter

@@ -7,7 +7,7 @@ import pytest
 
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.facts.serialise import plain
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.results.diagnosis import diagnosis_figures
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import sources_named

@@ -11,8 +11,16 @@ from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.shapes import AWAY_MM, TOWARDS, Spring, ranges, samples_of, shapes
 from dbbstation.diagnosis.verdicts import _CircleJudge
-from dbbstation.inference.levels import DifferenceFound, Differs, Followed, FollowsAnswer, Levels, VerdictsByLevel
-from dbbstation.inference.verdict import Acts, Verdict
+from dbbstation.inference.levels import (
+    Acts,
+    DifferenceFound,
+    Differs,
+    Followed,
+    FollowsAnswer,
+    Levels,
+    Verdict,
+    VerdictsByLevel,
+)
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 from studies.diagnosed import diagnose_sessions

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.disturbances import BarScale, BumpedJig
 from tests.plant.mechanisms.kinematics import RandomKinematics

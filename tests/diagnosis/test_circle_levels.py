@@ -10,12 +10,10 @@ from dbbstation.diagnosis.diagnose import thinned, without_doubtful, without_tes
 from dbbstation.diagnosis.explain import explain
 from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.chosen_anew import chosen_anew
-from dbbstation.inference.folds import in_turn
+from dbbstation.inference.folds import chosen_anew, in_turn
 from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
-from dbbstation.inference.levels import Differs, FollowsAnswer
+from dbbstation.inference.levels import Differs, FollowsAnswer, Verdict
 from dbbstation.inference.levels_of import form_probabilities
-from dbbstation.inference.verdict import Verdict
 from dbbstation.results.levels_text import short_sentences
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions

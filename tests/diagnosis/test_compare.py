@@ -14,7 +14,7 @@ from dbbstation.diagnosis.compare.set_up import ALIKE, JIG
 from dbbstation.errors import TraceError
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.model.observation import Observation
 from dbbstation.plan.plan import Direction
 from dbbstation.sources.contract import Setup

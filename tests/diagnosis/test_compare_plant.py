@@ -10,7 +10,7 @@ from scipy.stats import binom
 
 from dbbstation.diagnosis.compare.comparison import compare
 from dbbstation.diagnosis.diagnose import usable_sources
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.diagnosed import default_candidates
 from dbbstation.tasks.load import load_sessions

@@ -8,7 +8,7 @@ from dbbstation.diagnosis.diagnose import doubtful, thinned, without_doubtful
 from dbbstation.diagnosis.explain import explain
 from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
 from dbbstation.inference.alternatives import EVEN
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.gravity import Gravity

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
-from dbbstation.diagnosis.limits import held_beside, held_variance
+from dbbstation.diagnosis.verdicts import held_beside, held_variance
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.disturbances import BumpedJig

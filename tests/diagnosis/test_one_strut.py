@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dbbstation.diagnosis.diagnose import diagnose
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.backlash import Backlash

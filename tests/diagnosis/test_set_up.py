@@ -10,7 +10,7 @@ import pytest
 from dbbstation.calibration.outliers.outlier import OutlierKind
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.facts.serialise import plain
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.results.diagnosis import diagnosis_figures
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.bar import BarDrift
 from tests.plant.mechanisms.base import Mechanism

@@ -14,7 +14,7 @@ from dbbstation.diagnosis.unexplained import keep_unexplained
 from dbbstation.errors import ModelError
 from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.model import read_model, write_model
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.model.compensation import compensated
 from dbbstation.model.identified import position_uncertainty_mm
 from dbbstation.results.diagnosis import diagnosis_figures

@@ -7,7 +7,7 @@ import pytest
 
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.shapes import PULL, READING, SIGNED, TOOL, Follows
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics

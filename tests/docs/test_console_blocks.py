@@ -16,8 +16,7 @@ from dbbstation.cli import cli
 from dbbstation.cli.diagnose import _print as print_diagnosis
 from dbbstation.diagnosis.findings import Shift, SourceFinding, Unexplained
 from dbbstation.files.places import shipped_folder
-from dbbstation.inference.levels import DifferenceFound, Differs, Levels
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import DifferenceFound, Differs, Levels, Verdict
 from dbbstation.results.diagnosis import BeforeAfter, DiagnosisFigures
 from tests.cli.conftest import Outcome, call
 from tests.once import OF_TABLES, STUDIES, computed_once

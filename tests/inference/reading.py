@@ -10,7 +10,7 @@ from dbbstation.inference.read_off import Trial, read_off
 
 if TYPE_CHECKING:
     from dbbstation.inference.read_off import CauseFinding
-    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.settle import Settled
 
 
 def read_by_levels(settled: Settled, trial: Trial | None = None) -> tuple[CauseFinding, ...]:

@@ -10,9 +10,9 @@ import pytest
 
 from dbbstation.inference.alternatives import EVEN, Alternatives, named_already, standing_out, would_show
 from dbbstation.inference.hypotheses import Hypothesis, Posterior
+from dbbstation.inference.levels import OUT, SURE
 from dbbstation.inference.model_comparison import Variant
-from dbbstation.inference.settled import Outcome
-from dbbstation.inference.verdict import OUT, SURE
+from dbbstation.inference.settle import Outcome
 from tests.inference.dense import Dense, variant
 
 NAMES = "abcdef"

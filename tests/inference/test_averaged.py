@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from dbbstation.inference.settled import Settled
+from dbbstation.inference.settle import Settled
 
 
 def test_noise_models_count_by_their_own_probabilities():

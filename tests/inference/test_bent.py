@@ -9,14 +9,12 @@ import pytest
 from scipy.optimize import least_squares
 
 from dbbstation.inference.bent import bent_laws, grows_with, integral_of, memory_laws
-from dbbstation.inference.channel import beyond_reach
+from dbbstation.inference.channel import Kind, Variable, beyond_reach
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.read_off import named_values
-from dbbstation.inference.settle import settle
-from dbbstation.inference.settled import Beginning
-from dbbstation.inference.variables import Kind, Variable
+from dbbstation.inference.settle import Beginning, settle
 from tests.diagnosis.table.domains import answer
 from tests.inference.tables import direction, table
 from tests.inference.test_channel import channel

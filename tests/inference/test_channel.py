@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.channel import Base, Channel, Kind, Law, Variable
 from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.folds import held_out_error, selections_without
+from dbbstation.inference.levels import Verdict
 from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
 from dbbstation.inference.read_off import CauseFinding
 from dbbstation.inference.settle import settle
-from dbbstation.inference.variables import Kind, Variable
-from dbbstation.inference.verdict import Verdict
 from tests.inference.reading import read_by_levels
 from tests.inference.tables import Table, direction, table
 

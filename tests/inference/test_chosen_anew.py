@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from dbbstation.inference.chosen_anew import KnownGains, chosen_anew
+from dbbstation.inference.folds import KnownGains, chosen_anew
 from dbbstation.inference.hypotheses import search
+from dbbstation.inference.levels import ABSENT, DensityGains
 from dbbstation.inference.model_comparison import Member
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import Columns
-from dbbstation.inference.verdict import ABSENT, DensityGains
 from tests.inference.dense import cause, variant
 
 NOISE, PARTS, ROWS = 0.3, 10, 12

@@ -11,12 +11,10 @@ import pytest
 
 from dbbstation.inference.folds import Fold, HeldOutError, held_out_error, part_numbers, parts_of, selections_without
 from dbbstation.inference.left_over import left_over
-from dbbstation.inference.levels import FollowsAnswer
+from dbbstation.inference.levels import FollowsAnswer, Gains, Verdict
 from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.read_off import Trial, read_off
-from dbbstation.inference.settle import settle
-from dbbstation.inference.settled import Beginning
-from dbbstation.inference.verdict import Gains, Verdict
+from dbbstation.inference.settle import Beginning, settle
 from tests.inference.tables import direction, table
 from tests.inference.test_channel import EFFECTS, channel
 

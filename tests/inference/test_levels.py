@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from dbbstation.facts.value import Value
 from dbbstation.inference import settle as settling
 from dbbstation.inference.bank import Bank
-from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.channel import Base, Channel, Kind, Law, Variable
 from dbbstation.inference.folds import Fold, HeldOutError, parts_of
 from dbbstation.inference.followed import (
     ChosenWithoutParts,
@@ -28,6 +28,8 @@ from dbbstation.inference.hypotheses import SearchWork
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels import (
     TIME,
+    Acts,
+    DensityGains,
     Detectable,
     DifferenceFound,
     Differs,
@@ -35,6 +37,7 @@ from dbbstation.inference.levels import (
     FollowsAnswer,
     LawForm,
     Levels,
+    Verdict,
     VerdictsByLevel,
     difference_of,
 )
@@ -51,10 +54,7 @@ from dbbstation.inference.levels_of import (
 )
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES
 from dbbstation.inference.read_off import Trial, read_off
-from dbbstation.inference.settle import settle
-from dbbstation.inference.settled import Beginning
-from dbbstation.inference.variables import Kind, Variable
-from dbbstation.inference.verdict import Acts, DensityGains, Verdict
+from dbbstation.inference.settle import Beginning, settle
 from dbbstation.results.levels_text import level_sentences
 from tests.inference.tables import direction, table
 from tests.inference.test_channel import EFFECTS, channel

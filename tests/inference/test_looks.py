@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbbstation.inference.channel import Kind, Variable
 from dbbstation.inference.coloured import Coloured, Fitting
 from dbbstation.inference.looks import looked_for
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.variables import Kind, Variable
 
 
 @pytest.mark.parametrize("multiple", [1, 2, 3])

@@ -10,12 +10,11 @@ from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.inference.bank import Bank
 from dbbstation.inference.bent import memory_laws
-from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.channel import Base, Channel, Kind, Law, Variable
 from dbbstation.inference.coloured import Coloured
+from dbbstation.inference.levels import Verdict
 from dbbstation.inference.model_comparison import Member
 from dbbstation.inference.read_off import growth, moved
-from dbbstation.inference.variables import Kind, Variable
-from dbbstation.inference.verdict import Verdict
 from dbbstation.laws.memory import lagging
 from tests.diagnosis.table.nulls import moving, table_of
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from dbbstation.facts.value import Value
-from dbbstation.inference.levels import distinct_sizes, most_of_one_size, too_many, within_a_step
+from dbbstation.inference.levels import Verdict, distinct_sizes, most_of_one_size, too_many, within_a_step
 from dbbstation.inference.settle import settle
-from dbbstation.inference.verdict import Verdict
 from tests.inference.reading import read_by_levels
 from tests.inference.tables import table
 from tests.inference.test_channel import channel

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.chosen_anew import SHARE, columns_of, selection_frequency
+from dbbstation.inference.folds import SHARE, columns_of, selection_frequency
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import Columns
 from tests.inference.dense import Dense, cause, variant

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.facts.value import Value
-from dbbstation.inference.verdict import (
+from dbbstation.inference.levels import (
     ABSENT,
     PARTS_WITH_GAIN,
     SURE,

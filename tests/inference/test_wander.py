@@ -8,11 +8,10 @@ from scipy.stats import multivariate_normal
 
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.inference.bank import Bank
-from dbbstation.inference.channel import Base, Channel
+from dbbstation.inference.channel import Base, Channel, Kind, Variable
 from dbbstation.inference.levels import FollowsAnswer
 from dbbstation.inference.model_comparison import Member
 from dbbstation.inference.patterns import WALK_STEPS, wander
-from dbbstation.inference.variables import Kind, Variable
 from tests.diagnosis.table.nulls import null_table
 
 

@@ -10,8 +10,8 @@ from dbbstation.diagnosis.drive.sources import force, known_drive_sources
 from dbbstation.diagnosis.simulator.terms import Term, TermForm, evaluator
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.inference.bent import memory_laws
+from dbbstation.inference.channel import Kind, Variable
 from dbbstation.inference.patterns import Family, patterns
-from dbbstation.inference.variables import Kind, Variable
 from dbbstation.laws.contract import Scale
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.of_struts import of_struts

@@ -24,10 +24,9 @@ from dbbstation.diagnosis.parts import (
 )
 from dbbstation.diagnosis.shapes import EVERY, READING, SIGNED, UNITS, ranges, samples_of, shapes, variables
 from dbbstation.inference.alternatives import EQUIVALENT
-from dbbstation.inference.channel import NAMED_ODDS, Channel, Law
+from dbbstation.inference.channel import NAMED_ODDS, Channel, Kind, Law, Variable
 from dbbstation.inference.forms import LinearSplines, Lobes, SignForm
 from dbbstation.inference.patterns import Family, Pattern, patterns
-from dbbstation.inference.variables import Kind, Variable
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import Effect, LinearSource, Need
 from dbbstation.sources.registry import sources_named

@@ -19,17 +19,24 @@ from dbbstation.diagnosis.compare.set_up import with_set_up
 from dbbstation.errors import TraceError
 from dbbstation.inference.alternatives import cancelling
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.chosen_anew import KnownGains, gains_of_tests, groups_of_tests, rows_of_groups
-from dbbstation.inference.folds import held_out, in_turn, refits_without
+from dbbstation.inference.folds import (
+    KnownGains,
+    gains_of_tests,
+    groups_of_tests,
+    held_out,
+    in_turn,
+    refits_without,
+    rows_of_groups,
+)
 from dbbstation.inference.harmonics import bands, basis, coefficients
 from dbbstation.inference.left_over import left_over
+from dbbstation.inference.levels import OUT, SURE
 from dbbstation.inference.levels_of import levels_by_tests
 from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.square_root import compress
 from dbbstation.inference.triangle import ROUNDING, rms, root
-from dbbstation.inference.verdict import OUT, SURE
 from dbbstation.sources.registry import sources_named
 from dbbstation.trace.analysis import figures
 
@@ -44,7 +51,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.read_off import CauseFinding
-    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.settle import Settled
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource

@@ -127,7 +127,8 @@ def match(a: Sequence[Observation], b: Sequence[Observation]) -> Matching:
             "the sessions have no run in common" + (f" ({reasons})" if reasons else ""),
             remedy=f"compare sessions of one plan: A has accepted runs of the tests {names[0]}, B of {names[1]}",
         )
-    sectors = common_sectors([o.raw for key in common for o in of_a[key] + of_b[key]])
+    sparsest = min(len(o.raw) for key in common for o in of_a[key] + of_b[key])
+    sectors = min(BOUNDS.common_angles, sparsest // BOUNDS.samples_per_sector)
     pairs: list[Pair] = []
     averaged: list[str] = []
     for key in common:
@@ -139,11 +140,6 @@ def match(a: Sequence[Observation], b: Sequence[Observation]) -> Matching:
         for number, (x, y) in enumerate(sets, start=1):
             pairs.append(Pair(tuple(x), tuple(y), number, _mean(x, sectors), _mean(y, sectors)))
     return Matching(tuple(pairs), only_a, only_b, tuple(NotComparable(*one) for one in unlike.items()), tuple(averaged))
-
-
-def common_sectors(raws: Sequence[RawCircle]) -> int:
-    """Return the number of sectors that the sparsest run fills."""
-    return min(BOUNDS.common_angles, min(len(raw) for raw in raws) // BOUNDS.samples_per_sector)
 
 
 @dataclass(frozen=True, eq=False)

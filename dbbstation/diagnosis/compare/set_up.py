@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.compare.pairs import Pair, Sides
     from dbbstation.diagnosis.shapes import Samples
     from dbbstation.inference.levels import Followed
-    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.settle import Settled
     from dbbstation.sources.contract import ErrorSource, Motion
 
 JIG = "jig-position"

@@ -11,12 +11,11 @@ import numpy as np
 from dbbstation.diagnosis.drive.sources import force, variable_of
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.channel import Base, Channel, Kind, Law, Variable
 from dbbstation.inference.forms import Clock, Spline, modulated
+from dbbstation.inference.levels import SURE, Acts
 from dbbstation.inference.patterns import CURVES, Family, Pattern, of_blocks
 from dbbstation.inference.triangle import axes_of
-from dbbstation.inference.variables import Kind, Variable
-from dbbstation.inference.verdict import SURE, Acts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -16,9 +16,9 @@ from dbbstation.inference.folds import selections_without
 from dbbstation.inference.followed import ChosenWithoutParts, left_without
 from dbbstation.inference.hypotheses import Posterior
 from dbbstation.inference.left_over import COUNTS_SIGMA
+from dbbstation.inference.levels import Gains, is_worse
 from dbbstation.inference.settle import settle
 from dbbstation.inference.triangle import squares
-from dbbstation.inference.verdict import Gains, is_worse
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.channel import DriveChannel
     from dbbstation.diagnosis.drive.recordings import Recordings
     from dbbstation.inference.coloured import Coloured
-    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.settle import Settled
     from dbbstation.laws.contract import TableSource
 
 

@@ -12,8 +12,7 @@ from dbbstation.computing.arrays import Floats
 from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import Cancelling
-from dbbstation.inference.levels import Levels
-from dbbstation.inference.verdict import Acts, CatalogueFinding, Gains
+from dbbstation.inference.levels import Acts, CatalogueFinding, Gains, Levels
 
 
 @dataclass(frozen=True)

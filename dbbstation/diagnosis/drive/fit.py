@@ -14,10 +14,10 @@ from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
 from dbbstation.facts.value import Value
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import NEGATIVE_SIGMA
+from dbbstation.inference.levels import OUT
 from dbbstation.inference.model_comparison import slices_of
 from dbbstation.inference.read_off import values_of_law
 from dbbstation.inference.triangle import ROUNDING, root, triangle_of
-from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
     from collections.abc import Container, Sequence
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.channel import DriveChannel
     from dbbstation.inference.channel import Law
     from dbbstation.inference.model_comparison import Member
-    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.settle import Settled
 
 METHOD_U_SHARE = 5e-4
 """Relative standard uncertainty of values of a perfect recording, by low-pass, differences and times of reversals; on

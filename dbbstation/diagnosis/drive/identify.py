@@ -31,9 +31,9 @@ from dbbstation.inference.alternatives import cancelling_of
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import Hypothesis
 from dbbstation.inference.left_over import SIGNIFICANT, left_over
+from dbbstation.inference.levels import Verdict
 from dbbstation.inference.levels_of import detectable_causes, levels_of
 from dbbstation.inference.triangle import rms, root
-from dbbstation.inference.verdict import Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -11,9 +11,9 @@ import numpy as np
 from dbbstation.diagnosis.drive.signals import acceleration_over_two, derivatives, impulse_response, signals_of
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.levels import OUT
 from dbbstation.inference.square_root import slices
 from dbbstation.inference.triangle import left_by, rms
-from dbbstation.inference.verdict import OUT
 from dbbstation.laws.contract import Scale
 
 if TYPE_CHECKING:

@@ -12,12 +12,21 @@ from dbbstation.diagnosis.drive.channel import COGGING, COULOMB, MASS, METHOD_SH
 from dbbstation.diagnosis.drive.findings import CausePart, DriveFinding, UnexplainedForce
 from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, edges_of, pulse_parts
 from dbbstation.facts.value import Value
-from dbbstation.inference.levels import MOST_PUSHES, FollowsAnswer, ambiguous, open_to, with_texts
+from dbbstation.inference.levels import (
+    MOST_PUSHES,
+    OUT,
+    SURE,
+    FollowsAnswer,
+    Gains,
+    Verdict,
+    ambiguous,
+    open_to,
+    with_texts,
+)
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.read_off import NOT_NEEDED, CauseFinding, CauseJudge, Trial
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.triangle import norms, rms
-from dbbstation.inference.verdict import OUT, SURE, Gains, Verdict
 from dbbstation.laws.friction import COULOMB_SHARE
 
 if TYPE_CHECKING:

@@ -15,13 +15,12 @@ from dbbstation.diagnosis.simulator.search import compared, moves, search
 from dbbstation.diagnosis.simulator.separate import separations
 from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, FittedState, SimulationRuns
 from dbbstation.facts.value import Value, finite
-from dbbstation.inference.chosen_anew import LEAST_PARTS
-from dbbstation.inference.folds import refits_without
+from dbbstation.inference.folds import LEAST_PARTS, refits_without
 from dbbstation.inference.left_over import left_over
+from dbbstation.inference.levels import Verdict
 from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.triangle import rms
-from dbbstation.inference.verdict import Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -33,8 +32,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.separate import SeparatingInput
     from dbbstation.diagnosis.simulator.terms import Term
     from dbbstation.diagnosis.simulator.work import Run
-    from dbbstation.inference.chosen_anew import KnownGains
-    from dbbstation.inference.folds import HeldOutError
+    from dbbstation.inference.folds import HeldOutError, KnownGains
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.read_off import CauseFinding

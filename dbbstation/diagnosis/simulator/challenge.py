@@ -14,13 +14,13 @@ from dbbstation.diagnosis.simulator.nodes import Challenge
 from dbbstation.diagnosis.simulator.noise_left import log_probability_of, noise_left
 from dbbstation.diagnosis.simulator.terms import TermForm
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.verdict import SURELY
+from dbbstation.inference.levels import SURELY
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.candidates import Candidate
     from dbbstation.diagnosis.simulator.nodes import Node, Nodes
     from dbbstation.inference.model_comparison import Cause, Member
-    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.settle import Settled
 
 SHARES = (0.0, 0.3, 1.0)
 """Tried inaccuracies of forms, in units of the stated one, from exact to stated."""

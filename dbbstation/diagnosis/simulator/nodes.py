@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.work import SimulationRuns
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.model_comparison import Member
-    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.settle import Settled
     from dbbstation.laws.contract import PortSource
 
 

@@ -15,11 +15,10 @@ from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.trials import beside
 from dbbstation.diagnosis.simulator.work import BudgetSpentError
 from dbbstation.inference.bounds import BOUNDS, SIMULATORS
+from dbbstation.inference.levels import SURE, SURELY
 from dbbstation.inference.read_off import values_of_members
-from dbbstation.inference.settle import settle
-from dbbstation.inference.settled import Beginning
+from dbbstation.inference.settle import Beginning, settle
 from dbbstation.inference.triangle import rms
-from dbbstation.inference.verdict import SURE, SURELY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.nodes import Challenge, Node, Nodes
     from dbbstation.diagnosis.simulator.work import FittedState
     from dbbstation.inference.channel import Channel
-    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.settle import Settled
 
 RIVAL_SHARE = 0.5
 """Least log posterior of an inserted rival, over the best one's: linear responses to large terms may err by so much."""

@@ -12,7 +12,7 @@ from dbbstation.diagnosis.simulator.nodes import spread_of
 from dbbstation.diagnosis.simulator.trials import apart, beside, trial_inputs
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.verdict import OUT, Verdict
+from dbbstation.inference.levels import OUT, Verdict
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.bent import bent_laws, grows_with, is_same, memory_laws
-from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.channel import Base, Channel, Kind, Law, Variable
 from dbbstation.inference.triangle import ROUNDING, rms
-from dbbstation.inference.variables import Kind, Variable
 from dbbstation.laws.contract import SourceForm
 
 if TYPE_CHECKING:

@@ -19,14 +19,13 @@ from dbbstation.inference.folds import held_out_error, parts_of, refits_without,
 from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_with
 from dbbstation.inference.harmonics import noise_of
 from dbbstation.inference.left_over import left_over
+from dbbstation.inference.levels import OUT, Verdict, is_worse
 from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.read_off import Trial, read_off, values_of_members
-from dbbstation.inference.settle import settle, static_patterns
-from dbbstation.inference.settled import Beginning
+from dbbstation.inference.settle import Beginning, settle, static_patterns
 from dbbstation.inference.square_root import compress, solve
 from dbbstation.inference.triangle import rms, root
 from dbbstation.inference.uneven import widening_of
-from dbbstation.inference.verdict import OUT, Verdict, is_worse
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.read_off import CauseFinding
-    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.settle import Settled
     from dbbstation.inference.square_root import Solution
     from dbbstation.laws.contract import TableSource, Texts
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.variables import TRAVELS, Kind
+from dbbstation.inference.channel import TRAVELS, Kind
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

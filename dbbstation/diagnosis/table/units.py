@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from dbbstation.inference.variables import Kind
+from dbbstation.inference.channel import Kind
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.levels import Acts
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.verdict import Acts
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.table.mismatch import Mismatch

@@ -12,7 +12,7 @@ from dbbstation.diagnosis.simulator.nodes import Nodes
 from dbbstation.diagnosis.simulator.search import _rivals, compared_quickly
 from dbbstation.diagnosis.simulator.terms import TermForm
 from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
-from dbbstation.inference.settled import Beginning
+from dbbstation.inference.settle import Beginning
 
 ROWS = 400
 T = 0.01 * np.arange(ROWS)

@@ -27,7 +27,7 @@ from scipy.optimize import brentq, least_squares
 from scipy.signal import lfilter
 
 from dbbstation.diagnosis.table.mismatch import find_mismatch
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.tasks.tables import TableOptions, load_tables
 
 if TYPE_CHECKING:

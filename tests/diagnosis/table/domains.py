@@ -24,8 +24,8 @@ from scipy.signal import lfilter
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import Mismatch, find_mismatch
 from dbbstation.diagnosis.table.units import meaning_of
+from dbbstation.inference.channel import Kind, Variable
 from dbbstation.inference.levels import TIME, FollowsAnswer
-from dbbstation.inference.variables import Kind, Variable
 from tests.diagnosis.table.levels_study import interval, stored_table
 
 Values = NDArray[np.float64]

@@ -19,14 +19,12 @@ from unittest import mock
 import numpy as np
 
 from dbbstation.inference import patterns
+from dbbstation.inference.channel import Kind, Variable
 from dbbstation.inference.followed import VariableProbabilities, classes_of, probability_of_any
 from dbbstation.inference.forms import Spline
-from dbbstation.inference.levels import TIME
+from dbbstation.inference.levels import SURE, TIME
 from dbbstation.inference.levels_of import MARGIN, detectable
-from dbbstation.inference.settle import settle
-from dbbstation.inference.settled import Beginning
-from dbbstation.inference.variables import Kind, Variable
-from dbbstation.inference.verdict import SURE
+from dbbstation.inference.settle import Beginning, settle
 from tests.diagnosis.table.levels_study import EFFECTS, SAME, interval, table_of
 
 MARGINS, SHARES, ODDS = (1.0, 1.25, 1.5), (0.8, 0.9, 0.95), (4.0, 19.0, 99.0)

@@ -24,9 +24,9 @@ from scipy.signal import lfilter
 
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
+from dbbstation.inference.channel import Kind, Variable
 from dbbstation.inference.forms import Spline
 from dbbstation.inference.levels import TIME, FollowsAnswer
-from dbbstation.inference.variables import Kind, Variable
 from tests.diagnosis.table.nulls import NOISES, null_table
 
 if TYPE_CHECKING:

@@ -24,8 +24,8 @@ from scipy.signal import lfilter
 
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
-from dbbstation.inference.variables import Kind, Variable
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.channel import Kind, Variable
+from dbbstation.inference.levels import Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -30,7 +30,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt, medfilt, sosfilt
 
 from dbbstation.diagnosis.table.mismatch import find_mismatch
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.tasks.tables import TableOptions, load_tables
 
 if TYPE_CHECKING:

@@ -27,8 +27,8 @@ from scipy.signal import lfilter
 
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
+from dbbstation.inference.channel import Kind, Variable
 from dbbstation.inference.levels import CORRECTS
-from dbbstation.inference.variables import Kind, Variable
 from dbbstation.results.mismatch import mismatch_result
 
 if TYPE_CHECKING:

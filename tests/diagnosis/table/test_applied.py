@@ -10,7 +10,7 @@ import pytest
 from dbbstation.diagnosis.table.applied import applied
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
-from dbbstation.inference.variables import Variable
+from dbbstation.inference.channel import Variable
 from tests.diagnosis.table.domains import made
 
 

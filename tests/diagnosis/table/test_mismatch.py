@@ -14,14 +14,12 @@ from dbbstation.diagnosis.table.mismatch import Mismatch, chosen_again, find_mis
 from dbbstation.diagnosis.table.next_measurement import next_measurements
 from dbbstation.inference import looks
 from dbbstation.inference.bank import Bank
-from dbbstation.inference.channel import Base, Channel
+from dbbstation.inference.channel import Base, Channel, Kind, Variable
 from dbbstation.inference.folds import parts_of, refits_without
-from dbbstation.inference.levels import FollowsAnswer
+from dbbstation.inference.levels import FollowsAnswer, Verdict
 from dbbstation.inference.read_off import Trial
 from dbbstation.inference.seen import seen
 from dbbstation.inference.settle import settle, static_patterns
-from dbbstation.inference.variables import Kind, Variable
-from dbbstation.inference.verdict import Verdict
 from dbbstation.results.mismatch import mismatch_result
 from dbbstation.tasks.tables import TableOptions, load_tables
 from tests.diagnosis.table import plant

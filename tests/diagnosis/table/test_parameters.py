@@ -10,7 +10,7 @@ import pytest
 from dbbstation.diagnosis.table.mismatch import find_mismatch, refitted
 from dbbstation.errors import ArgumentError, InputError
 from dbbstation.facts.value import Value
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.results.mismatch import mismatch_result
 from dbbstation.tasks.tables import TableOptions, load_tables, stated_uncertainties
 

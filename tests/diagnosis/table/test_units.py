@@ -7,9 +7,8 @@ import pytest
 
 from dbbstation.diagnosis.table.units import meaning_of, stated_meaning
 from dbbstation.errors import ArgumentError
-from dbbstation.inference.channel import Base, Channel
+from dbbstation.inference.channel import Base, Channel, Kind, Variable
 from dbbstation.inference.settle import settle
-from dbbstation.inference.variables import Kind, Variable
 from dbbstation.tasks.tables import stated_variables
 
 

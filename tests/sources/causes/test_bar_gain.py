@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.inference.verdict import Verdict
+from dbbstation.inference.levels import Verdict
 from dbbstation.sources.causes.bar_gain import BarGain
 from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.disturbances import BarScale

@@ -97,16 +97,62 @@ COMPARE = (
 )
 """Of `compare`."""
 
+SEARCHED = (
+    Constant("inference.bank", "HARDLY_TAKEN", (0.9, 0.975)),
+    Constant("inference.bank", "LARGE"),
+    Constant("inference.bent", "DEPARTS"),
+    Constant("inference.bent", "AT_ONCE", (0.25, 0.75)),
+    Constant("inference.bent", "MADE", (0.8, 0.95)),
+    Constant("inference.bent", "WIDEST", (0.9, 0.975)),
+    Constant("inference.channel", "LARGEST"),
+    Constant("inference.channel", "CONTINUOUS"),
+    Constant("inference.coloured", "FEWEST_INDEPENDENT"),
+    Constant("inference.coloured", "SHORTEST_OF_ALL"),
+    Constant("inference.looks", "NEIGHBOUR", (0.4, 0.85)),
+    Constant("inference.model_comparison", "MOST_SLACK"),
+    Constant("inference.patterns", "CURVES"),
+    Constant("inference.patterns", "DISTINCT"),
+    Constant("inference.patterns", "WALK_STEPS"),
+    Constant("inference.patterns", "WAVE_SHARE"),
+    Constant("inference.stretches", "INDEPENDENT"),
+    Constant("inference.stretches", "SHORTEST"),
+)
+"""Of the search of a table's channel and of its noise. Of a share near one, what it lacks of one is halved and doubled."""
+
+JUDGED = (
+    Constant("inference.alternatives", "EVEN", (0.25, 0.75)),
+    Constant("inference.channel", "BEYOND"),
+    Constant("inference.channel", "NEGATIVE_SIGMA"),
+    Constant("inference.folds", "ENOUGH_BLOCKS"),
+    Constant("inference.folds", "LEAST_PARTS"),
+    Constant("inference.folds", "WIDEST_GAP", (0.25, 0.75)),
+    Constant("inference.followed", "LEAST_ADDED"),
+    Constant("inference.followed", "MOST_PARTS", (0.25, 0.75)),
+    Constant("inference.left_over", "BINS"),
+    Constant("inference.left_over", "FEWEST"),
+    Constant("inference.left_over", "SIGNIFICANT"),
+    Constant("inference.levels", "ONE_SIZE", (0.998, 0.9995)),
+    Constant("inference.levels", "OUT"),
+    Constant("inference.levels", "PARTS_WITH_GAIN", (0.55, 0.85)),
+    Constant("inference.levels", "SEEN_WORSE"),
+    Constant("inference.levels", "SURE", (0.9, 0.975)),
+    Constant("inference.levels_of", "CARRIES", (0.25, 0.75)),
+    Constant("inference.levels_of", "DETERMINED", (0.8, 0.95)),
+    Constant("inference.levels_of", "MARGIN", (1.0, 1.5)),
+    Constant("inference.levels_of", "POWER", (0.8, 0.95)),
+    Constant("inference.levels_of", "SLOW"),
+)
+"""Of verdicts and answers from probabilities, held-out parts and residuals."""
+
 TABLE = (
     *ENGINE,
     Constant("diagnosis.table.data", "REFITTED"),
     Constant("diagnosis.table.mismatch", "FAR_STATED"),
-    Constant("inference.bent", "DEPARTS"),
-    Constant("inference.bent", "AT_ONCE", (0.25, 0.75)),
     *SAID,
-    Constant("inference.bank", "HARDLY_TAKEN", (0.9, 0.975)),
+    *SEARCHED,
+    *JUDGED,
 )
-"""Of `mismatch`. Of a share near one, what it lacks of one is halved and doubled."""
+"""Of `mismatch`."""
 
 
 @dataclass(frozen=True)

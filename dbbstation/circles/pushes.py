@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import gamma, gammaln
 
 from dbbstation.computing.arrays import average_of
-from dbbstation.inference.uneven import TAILS, student_likelihood
+from dbbstation.inference.coloured import TAILS, student_likelihood
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

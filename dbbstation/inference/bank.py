@@ -20,7 +20,12 @@ from dbbstation.inference.coloured import (
     autoregressive,
     bands_of,
     first_order,
+    has_long_tails,
     largest_decay,
+    log_student,
+    most_probable_tails,
+    most_probable_variance,
+    spread_by_kind,
     with_put_back,
 )
 from dbbstation.inference.forms import modulated
@@ -30,13 +35,6 @@ from dbbstation.inference.patterns import NAMED, ZERO_SD, Family, log_odds, odds
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import compress, solve, with_random
 from dbbstation.inference.triangle import ROUNDING, rms
-from dbbstation.inference.uneven import (
-    has_long_tails,
-    log_student,
-    most_probable_tails,
-    most_probable_variance,
-    spread_by_kind,
-)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

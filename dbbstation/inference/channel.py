@@ -1,4 +1,4 @@
-"""A channel: measured minus simulated values over variables, with possible contributions.
+"""A channel: measured minus simulated values over variables, with laws of stated physics as contributions.
 
 A client supplies residual rows in blocks, variables, base columns and laws (physical causes as columns). Every
 hypothesis refits the base. `settle` compares sets of laws and of patterns without physics.

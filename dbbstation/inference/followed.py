@@ -9,12 +9,12 @@ import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Kind
+from dbbstation.inference.coloured import log_student
 from dbbstation.inference.levels import RUN, SURE, TIME, DensityGains
+from dbbstation.inference.looks import IN_TIME
 from dbbstation.inference.model_comparison import all_columns, belong_to
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.triangle import rms, squares
-from dbbstation.inference.uneven import log_student
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence

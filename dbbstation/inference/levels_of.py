@@ -16,7 +16,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Kind, impossible
-from dbbstation.inference.coloured import FEWEST_INDEPENDENT, NOTHING
+from dbbstation.inference.coloured import FEWEST_INDEPENDENT, NOTHING, widening_of
 from dbbstation.inference.followed import (
     VariableProbabilities,
     classes_of,
@@ -46,7 +46,6 @@ from dbbstation.inference.levels import (
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES, all_columns
 from dbbstation.inference.patterns import CURVES, Family
 from dbbstation.inference.triangle import ROUNDING, left_by, norms, root, squares, triangle_of
-from dbbstation.inference.uneven import widening_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence

@@ -15,16 +15,16 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out, would_show
 from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.channel import Kind, impossible, impossible_beside
+from dbbstation.inference.coloured import widening_of
 from dbbstation.inference.folds import weighted_jackknife
 from dbbstation.inference.forms import HARMONICS
 from dbbstation.inference.levels import ABSENT, Acts, Gains, Said, Verdict, VerdictsByLevel, ambiguous, open_to
+from dbbstation.inference.looks import IN_TIME
 from dbbstation.inference.model_comparison import SCALES, amplitude_size, slices_of
 from dbbstation.inference.patterns import ZEROS, Family, covers_turns, zeros_text
-from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.square_root import runs_of
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.triangle import rms, root
-from dbbstation.inference.uneven import widening_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

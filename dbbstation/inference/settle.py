@@ -14,10 +14,10 @@ from dbbstation.inference.bank import Bank, alike, amplitudes_of
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import NEGATIVE_SIGMA, Kind, Variable, beyond_reach, impossible, impossible_beside
 from dbbstation.inference.hypotheses import Hypothesis, SearchWork, search
+from dbbstation.inference.looks import MOVED, places_anew, seen
 from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.patterns import patterns, wander
 from dbbstation.inference.read_off import moved, values_of_law
-from dbbstation.inference.seen import MOVED, places_anew, seen
 from dbbstation.inference.triangle import rms, squares
 
 if TYPE_CHECKING:

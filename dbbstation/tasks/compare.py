@@ -52,7 +52,7 @@ def compare(
         StoppedError: `stop` returned True.
     """
     from dbbstation.diagnosis.compare.comparison import compare as put_side_by_side
-    from dbbstation.diagnosis.compare.notes import notes_of
+    from dbbstation.diagnosis.compare.comparison import notes_of
     from dbbstation.diagnosis.diagnose import usable_sources
     from dbbstation.results.comparison import comparison_result
     from dbbstation.sources.registry import known_sources, sources_named

@@ -131,8 +131,7 @@ def _unnamed(found: Diagnosis) -> JointFitWithCurve | None:
 
 
 def _drawn(diagnosis: Diagnosis, wanted: object) -> Any:  # noqa: ANN401 - as asked for
-    from dbbstation.diagnosis.per_test import gains_by_test
-    from dbbstation.diagnosis.source_curves import source_curves
+    from dbbstation.diagnosis.source_curves import gains_by_test, source_curves
     from dbbstation.report.diagnosis_figure import diagnosis_figure
     from dbbstation.report.figure_format import figure_format
 

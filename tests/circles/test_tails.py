@@ -8,7 +8,7 @@ from scipy.stats import gennorm, kurtosis, t
 
 from dbbstation.circles.form import form_and_noise
 from dbbstation.circles.pushes import EXPONENTS, NO_TAILS, Pushes, pushes_of
-from dbbstation.inference.uneven import TAILS
+from dbbstation.inference.coloured import TAILS
 
 COUNT = 720
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.per_test import gains_by_test
+from dbbstation.diagnosis.source_curves import gains_by_test
 from dbbstation.facts.serialise import plain
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.results.diagnosis import diagnosis_figures

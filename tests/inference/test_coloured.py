@@ -14,9 +14,12 @@ from dbbstation.inference.coloured import (
     bands_of,
     first_order,
     largest_decay,
+    log_student,
+    most_probable_tails,
+    most_probable_variance,
+    widening_of,
     with_put_back,
 )
-from dbbstation.inference.uneven import log_student, most_probable_tails, most_probable_variance, widening_of
 
 RADIUS, TURN = 0.9, 2.0 * np.pi / 12.0
 RESONANT = np.array([1.0, -2.0 * RADIUS * np.cos(TURN), RADIUS**2])

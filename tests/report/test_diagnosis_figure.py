@@ -11,9 +11,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from dbbstation.diagnosis.findings import Curve, CurvePoint, Unexplained
-from dbbstation.diagnosis.per_test import gains_by_test
 from dbbstation.diagnosis.shapes import READING, Follows
-from dbbstation.diagnosis.source_curves import source_curves
+from dbbstation.diagnosis.source_curves import gains_by_test, source_curves
 from dbbstation.inference.levels import Followed, FollowsAnswer
 from dbbstation.report.diagnosis_figure import diagnosis_figure, draw_unexplained
 from dbbstation.results.frame import OnePanel

@@ -13,11 +13,11 @@ from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.noise_left import noise_left
 from dbbstation.diagnosis.simulator.search import compared_quickly, search
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.coloured import log_student
 from dbbstation.inference.folds import Fold, HeldOutError, KnownGains, beside, part_numbers
 from dbbstation.inference.followed import ClassGain, VariableProbabilities, classes_of, followed_by
 from dbbstation.inference.levels import DensityGains
 from dbbstation.inference.triangle import rms
-from dbbstation.inference.uneven import log_student
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence

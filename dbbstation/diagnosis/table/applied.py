@@ -11,6 +11,7 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.table.mismatch import fitted_together
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.bank import amplitudes_of, spacing_of, tangents_of
+from dbbstation.inference.coloured import widening_of
 from dbbstation.inference.folds import parts_of, refits_without, weighted_jackknife
 from dbbstation.inference.followed import followed_by
 from dbbstation.inference.levels import ONCE
@@ -18,7 +19,6 @@ from dbbstation.inference.model_comparison import slices_of
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.read_off import growth, moved
 from dbbstation.inference.settle import static_patterns
-from dbbstation.inference.uneven import widening_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

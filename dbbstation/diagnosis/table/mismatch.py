@@ -15,6 +15,7 @@ from dbbstation.errors import CalibrationError
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import cancelling_of
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.coloured import widening_of
 from dbbstation.inference.folds import held_out_error, parts_of, refits_without, selections_without, weighted_jackknife
 from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_with
 from dbbstation.inference.harmonics import noise_of
@@ -25,7 +26,6 @@ from dbbstation.inference.read_off import Trial, read_off, values_of_members
 from dbbstation.inference.settle import Beginning, settle, static_patterns
 from dbbstation.inference.square_root import compress, solve
 from dbbstation.inference.triangle import rms, root
-from dbbstation.inference.uneven import widening_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -10,7 +10,7 @@ from dbbstation.diagnosis.simulator.nodes import Nodes, RanAwayError
 from dbbstation.diagnosis.simulator.terms import Term, TermForm
 from dbbstation.diagnosis.simulator.trials import apart, trial_inputs
 from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
-from dbbstation.inference.uneven import spread_by_kind
+from dbbstation.inference.coloured import spread_by_kind
 from tests.diagnosis.simulator.systems import held
 
 T = 0.1 * np.arange(200)

@@ -17,8 +17,8 @@ from dbbstation.inference.bank import Bank
 from dbbstation.inference.channel import Base, Channel, Kind, Variable
 from dbbstation.inference.folds import parts_of, refits_without
 from dbbstation.inference.levels import FollowsAnswer, Verdict
+from dbbstation.inference.looks import seen
 from dbbstation.inference.read_off import Trial
-from dbbstation.inference.seen import seen
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.results.mismatch import mismatch_result
 from dbbstation.tasks.tables import TableOptions, load_tables

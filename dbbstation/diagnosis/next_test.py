@@ -10,6 +10,7 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.computing.threads import with_one_thread
+from dbbstation.diagnosis.effects import TILTS_DEG
 from dbbstation.diagnosis.findings import NextTest
 from dbbstation.diagnosis.parts import amplitudes, by_amplitudes, by_terms
 from dbbstation.inference.alternatives import would_show
@@ -36,7 +37,9 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
 
 
-TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0), (23.0, 0.0), (-23.0, 0.0), (0.0, 23.0))
+STEEP_DEG = ((23.0, 0.0), (-23.0, 0.0), (0.0, 23.0))
+"""Further tilts of proposed tests."""
+
 ELEVATIONS_DEG = (0.0, 10.0, -10.0)
 WAITS_S = (0.0, 3600.0)
 FEEDS = (0.5, 2.0)
@@ -113,7 +116,7 @@ class ForeseenTests:
         for observation in seen.values():
             circle = observation.raw.circle
             x, y, z = circle.ball_mm
-            for a, b in TILTS_DEG:
+            for a, b in (*TILTS_DEG, *STEEP_DEG):
                 for elevation in ELEVATIONS_DEG:
                     height = z + circle.bar_mm * float(np.sin(np.radians(elevation)))
                     tried = replace(

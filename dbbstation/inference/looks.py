@@ -16,7 +16,7 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Kind, Variable
 from dbbstation.inference.coloured import Fitting, Left, LeftBesideOthers
 from dbbstation.inference.forms import HARMONICS, Bump, Form, Spline, StepForm, Wave
-from dbbstation.inference.patterns import Family, Pattern, log_odds
+from dbbstation.inference.patterns import CURVES, Family, Pattern, log_odds
 from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.stretches import refined, stretches
 
@@ -210,7 +210,7 @@ PLACED = (Family.WAVE, Family.BUMP, Family.STEP)
 WIDTHS = (64.0, 32.0, 16.0, 8.0)
 """Ratios of the range to standard deviations of bumps."""
 
-FINER_CURVES = (14, 28)
+FINER_CURVES = (2 * CURVES, 4 * CURVES)
 """Numbers of functions of more flexible curves."""
 
 NEIGHBOUR = 0.7

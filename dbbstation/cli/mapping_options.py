@@ -180,20 +180,14 @@ def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, aske
             f"which column has the readings of the bar; these are not understood: {unknown}",
         )
     own = set(table.table.names) >= EXPORTED
-    trace: str | None = options.trace
-    if ANGLE not in means and not own and trace is None:
-        question = (
-            "no column was taken for an angle: are the files the whole run with feed-in and feed-out, or the turn alone"
-            + f"; not understood: {unknown}, say --columns 'NAME=angle:deg' where one is the angle" * bool(unknown)
-        )
-        trace = asker.text(question, "--trace", ["whole", "turn"])
+    trace = options.trace or ("whole" if own else None if ANGLE in means else _trace(asker, unknown))
     angle = _angle(options, asker, own=own) if ANGLE in means else None
     zero_mm = options.zero_mm
     if DEVIATION in means and zero_mm is None:
         zero_mm = asker.number("length of the bar at which the deviation is 0 [mm]", "--zero-mm", needed=True)
     told = {
         "columns": columns,
-        "trace": "whole" if own and trace is None else trace,
+        "trace": trace,
         "file_name": options.file_name,
         "split": "column" if "run" in means else options.split,
         "zone": options.zone,
@@ -226,6 +220,14 @@ def _columns(table: ForeignTable, said: Sequence[str]) -> dict[str, Proposed]:
         taken |= {"length", "deviation"}
     left = {name: Proposed("ignored") if one.means in taken else one for name, one in guessed.items()}
     return {name: told.get(name) or left[name] for name in table.table.names}
+
+
+def _trace(asker: Asker, unknown: str) -> str:
+    question = (
+        "no column was taken for an angle: are the files the whole run with feed-in and feed-out, or the turn alone"
+        + f"; not understood: {unknown}, say --columns 'NAME=angle:deg' where one is the angle" * bool(unknown)
+    )
+    return asker.text(question, "--trace", ["whole", "turn"])
 
 
 def _angle(options: MappingOptions, asker: Asker, *, own: bool) -> dict[str, object]:

@@ -160,31 +160,15 @@ def measure(
 
 def _in_lines(asked: Asked, auto: str | None, *, as_json: bool) -> None:
     from dbbstation.instrument.driver import Instrument
-    from dbbstation.instrument.stamps import MachineTime
     from dbbstation.service.held_line import RECONNECT_S, driver_patience
     from dbbstation.station.assembly import assemble
-    from dbbstation.station.detector import Patience
-    from dbbstation.virtual.wire_clock import ScaledClock
 
     job, protocol = asked.job()
-    line, time_scale = asked.line, asked.time_scale
+    line = asked.line
     hands = None if auto is None else VirtualHands(auto)
     stands_s = -math.inf if hands is None else hands.stands_since_s()
     waits = math.isfinite(stands_s)
-    scale = _WAITING_SCALE if waits else time_scale
-    job = replace(
-        job,
-        patience=Patience() if auto is None else Patience(for_machine_s=_AUTO_PATIENCE_S * max(time_scale, 1.0)),
-        clock=MachineTime(1.0 / protocol.fastest_hz(line.baud), stands_s) if waits else ScaledClock(scale),
-        time_scale=scale,
-        # A real machine neither has a control address of `instrument emulate` nor runs faster than it does.
-        instrument=job.instrument
-        and replace(
-            job.instrument,
-            port=f"{line.port}, in machine time" if waits else line.port,
-            virtual=auto is not None or time_scale != 1.0 or job.instrument.virtual,
-        ),
-    )
+    job = _timed(job, asked, protocol, stands_s, machine_is_virtual=auto is not None)
     job.check(str(asked.plan))
     say_sampling(job.plan.to_domain(), protocol, line.baud)
     if job.machine.control is not None:
@@ -200,7 +184,7 @@ def _in_lines(asked: Asked, auto: str | None, *, as_json: bool) -> None:
             clock=job.clock,
             log=log,
             reconnect_s=RECONNECT_S,
-            **driver_patience(scale, waits=waits),
+            **driver_patience(job.time_scale, waits=waits),
         ) as source,
     ):
         workplace = assemble(job, source, source.unreadable, asked=protocol.ask.asked)
@@ -209,6 +193,28 @@ def _in_lines(asked: Asked, auto: str | None, *, as_json: bool) -> None:
         interrupted = _run(workplace, hands, as_json=as_json)
     if interrupted:
         raise click.Abort
+
+
+def _timed(job: Job, asked: Asked, protocol: Protocol, stands_s: float, *, machine_is_virtual: bool) -> Job:
+    """Return the job with the clock of its machine, which stopped to wait at `stands_s` or never waits."""
+    from dbbstation.instrument.stamps import MachineTime
+    from dbbstation.station.detector import Patience
+    from dbbstation.virtual.wire_clock import ScaledClock
+
+    line, time_scale, waits = asked.line, asked.time_scale, math.isfinite(stands_s)
+    return replace(
+        job,
+        patience=Patience(for_machine_s=_AUTO_PATIENCE_S * max(time_scale, 1.0)) if machine_is_virtual else Patience(),
+        clock=MachineTime(1.0 / protocol.fastest_hz(line.baud), stands_s) if waits else ScaledClock(time_scale),
+        time_scale=_WAITING_SCALE if waits else time_scale,
+        # A real machine neither has a control address of `instrument emulate` nor runs faster than it does.
+        instrument=job.instrument
+        and replace(
+            job.instrument,
+            port=f"{line.port}, in machine time" if waits else line.port,
+            virtual=machine_is_virtual or time_scale != 1.0 or job.instrument.virtual,
+        ),
+    )
 
 
 def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> bool:

@@ -56,21 +56,13 @@ def expected_circle(
     to_local = 1e3 * np.linalg.pinv(local_columns(theta)) if len(theta) >= SECTORS else None
     long_mm = reading.length_mm - sparse.raw.circle.bar_mm
     off = fit @ long_mm
-    covariance = np.zeros((3, 3))
-    again = np.zeros((COEFFICIENTS, COEFFICIENTS))
-    effects: dict[tuple[str, str], Floats] = {}
-    local: dict[tuple[str, str], Floats] = {}
-    moving: set[tuple[str, str]] = set()
     shapes = form_columns(theta - start)[:, HIGHER]
-    for cause in _acting(reading, motion, model, identified, causes, shapes, observation.test):
-        effects[cause.key] = effect = to_form @ cause.columns_mm
-        again += cause.scatters * effect @ effect.T
-        if cause.moving:
-            moving.add(cause.key)
-        if to_local is not None and not cause.at_a_pose:
-            local[cause.key] = to_local @ cause.columns_mm
-        if cause.at_a_pose:
-            covariance += (fit @ cause.columns_mm) @ (fit @ cause.columns_mm).T
+    acting = list(_acting(reading, motion, model, identified, causes, shapes, observation.test))
+    effects = [to_form @ cause.columns_mm for cause in acting]
+    local = [] if to_local is None else [(one.key, to_local @ one.columns_mm) for one in acting if not one.at_a_pose]
+    moves = [fit @ cause.columns_mm for cause in acting if cause.at_a_pose]
+    again = [cause.scatters * effect @ effect.T for cause, effect in zip(acting, effects, strict=True)]
+    covariance = sum((move @ move.T for move in moves), np.zeros((3, 3)))
     # A raised bar measures cos e times a horizontal shift.
     along = sparse.raw.circle.radius_mm / sparse.raw.circle.bar_mm
     scale = np.diag([1.0 / along, 1.0 / along, 1.0])
@@ -83,10 +75,10 @@ def expected_circle(
         mounting_mm=mounting_mm,
         reversals_deg=_reversals_deg(observation, model),
         form_um=to_form @ long_mm,
-        effects_um=effects,
-        local_um=local,
-        moving=frozenset(moving),
-        again_um2=again,
+        effects_um={cause.key: effect for cause, effect in zip(acting, effects, strict=True)},
+        local_um=dict(local),
+        moving=frozenset(cause.key for cause in acting if cause.moving),
+        again_um2=sum(again, np.zeros((COEFFICIENTS, COEFFICIENTS))),
         place_um=1e3 * hypot_of(mounting_mm, observation.setup.ball_uncertainty_mm),
     )
 

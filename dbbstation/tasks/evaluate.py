@@ -61,11 +61,6 @@ def evaluate(
         StoppedError: `stop` returned True.
     """
     from dbbstation.calibration.reporting import evaluation
-    from dbbstation.calibration.reporting.evaluation import (
-        evaluated_tolerances,
-        plane_figures,
-        plane_uncertainty_um,
-    )
     from dbbstation.calibration.reporting.prediction import predicted_circles
     from dbbstation.facts import of_facts
     from dbbstation.machine.geometry import check_model_is_of
@@ -83,8 +78,8 @@ def evaluate(
     circles = predicted_circles(identified.model, recorded.observations, telling.counted("predicting runs"))
     runs = tuple(replace(run, circularity_30_upr_um=circle) for run, circle in zip(found.runs, circles, strict=True))
     height_mm = min(observation.raw.circle.centre_mm[2] for observation in recorded.observations)
-    plane = plane_figures(identified.model, height_mm)
-    flatness_u_um, parallelism_u_um = plane_uncertainty_um(identified, height_mm)
+    plane = evaluation.plane_figures(identified.model, height_mm)
+    flatness_u_um, parallelism_u_um = evaluation.plane_uncertainty_um(identified, height_mm)
     own, placed = identified.model.of_the_machine().sources, identified.model.anywhere().sources
     return of_facts(
         EvaluationResult,
@@ -99,6 +94,6 @@ def evaluate(
         else None,
         plane_z_mm=height_mm,
         plane_without=tuple(f.source.name for f in own if f not in placed and not f.source.of_currents),
-        tolerances=evaluated_tolerances(tolerances, runs),
+        tolerances=evaluation.evaluated_tolerances(tolerances, runs),
         notes=tuple(telling.notes),
     )

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.facts import of_facts
 from dbbstation.machine.geometry import NOT_PREDICTED, differences, in_words
 from dbbstation.results.fleet import FleetComparison, Scored, SharedCause
 from dbbstation.sisters.unlike import FEWEST, held_against_sisters
@@ -18,12 +19,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Difference, Machine
     from dbbstation.results.fleet import FleetFound, FleetValue
-
-SCORED = ("kind", "quantity", "of", "unit", "value", "uncertainty")
-"""Fields of a value that its score has, too."""
-
-FROM_OTHERS = ("usual", "scatter", "score", "smallest_seen")
-"""Fields of a score that are None without enough other machines."""
+    from dbbstation.sisters.unlike import Sisters
 
 MOST_NAMED = 5
 """Greatest number of machines that a note names."""
@@ -62,28 +58,11 @@ def compared(sisters: Sequence[Sister], false_alarms: float) -> FleetComparison:
                 number, sure = float(np.log(number)), sure / number
             numbers[row, place], u[row, place] = number, sure
     held = held_against_sisters(numbers, u, false_alarms)
-    scored = []
-    for row, key in enumerate(keys):
-        for place, value in rows[key].items():
-            middle, scatter, score, smallest = (
-                float(of[row, place]) for of in (held.middle, held.scatter, held.score, held.smallest_seen)
-            )
-            known = bool(np.isfinite(score))
-            if value.logarithmic:
-                middle = float(np.exp(middle))
-                scatter, smallest = middle * scatter, middle * float(np.expm1(min(smallest, _LARGEST_LOG)))
-            found = (middle, scatter, score, smallest) if known else [None] * len(FROM_OTHERS)
-            by_others: dict[str, Any] = dict(zip(FROM_OTHERS, found, strict=True))
-            scored.append(
-                Scored(
-                    machine=sisters[place].name,
-                    session=sisters[place].session,
-                    **{name: getattr(value, name) for name in SCORED},
-                    sisters=len(rows[key]) - 1,
-                    **by_others,
-                    unlike=bool(held.unlike[row, place]),
-                )
-            )
+    scored = [
+        _scored(sisters[place], value, held, (row, place), len(rows[key]) - 1)
+        for row, key in enumerate(keys)
+        for place, value in rows[key].items()
+    ]
     enough = sum(len(of) >= FEWEST for of in rows.values())
     notes += _alone([key for key in keys if len(rows[key]) < FEWEST])
     return FleetComparison(
@@ -94,6 +73,19 @@ def compared(sisters: Sequence[Sister], false_alarms: float) -> FleetComparison:
         causes=_causes(sisters),
         notes=tuple(notes),
     )
+
+
+def _scored(sister: Sister, value: FleetValue, held: Sisters, at: tuple[int, int], others: int) -> Scored:
+    middle, scatter, score, smallest = (
+        float(of[at]) for of in (held.middle, held.scatter, held.score, held.smallest_seen)
+    )
+    if value.logarithmic:
+        middle = float(np.exp(middle))
+        scatter, smallest = middle * scatter, middle * float(np.expm1(min(smallest, _LARGEST_LOG)))
+    found = (middle, scatter, score, smallest) if np.isfinite(score) else (None,) * 4
+    by_others = dict(zip(("usual", "scatter", "score", "smallest_seen"), found, strict=True))
+    further = {"machine": sister.name, "session": sister.session, "sisters": others, "unlike": bool(held.unlike[at])}
+    return of_facts(Scored, value, **further, **by_others)
 
 
 _LARGEST_LOG = 300.0

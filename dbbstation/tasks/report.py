@@ -114,9 +114,7 @@ def report(
     found = load_circles(
         now, TOLERATED, tests, exclude, findings=True, model=identified, progress=telling.counted("circles")
     )
-    former = None
-    if then is not None:
-        former = load_circles([then], TOLERATED, progress=telling.counted("circles before"))
+    former = None if then is None else load_circles([then], TOLERATED, progress=telling.counted("circles before"))
     modelled = ranked = None
     if identified is not None:
         for session in found.sessions:

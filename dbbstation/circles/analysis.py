@@ -19,6 +19,8 @@ from dbbstation.trace.cut import edges_of, overlap_feed_under
 from dbbstation.trace.recording import lost_samples
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from dbbstation.circles.noise import CircleNoise
     from dbbstation.circles.reversals import Harmonic, ReversalStep
     from dbbstation.computing.arrays import Floats
@@ -125,7 +127,7 @@ def refiltered(one: CircleAnalysis, chosen: Filter) -> CircleAnalysis:
     return replace(one, chosen=chosen, **_of_path(path_of(one.raw, chosen), one.radius_error_um))
 
 
-def _of_path(path: CirclePath, radius_error_um: float) -> dict[str, Any]:
+def _of_path(path: CirclePath, radius_error_um: float) -> Mapping[str, Any]:
     """Return the figures that the filter affects."""
     deviation_mm = path.least_squares.deviation_mm
     return {

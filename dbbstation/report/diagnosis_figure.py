@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drawn import Branch, GainOfTest, SourceCurves
     from dbbstation.diagnosis.findings import Curve, Diagnosis
     from dbbstation.inference.levels import Followed
+    from dbbstation.report.drawing import LineStyle
 
 
 PER_WAVE = 24
@@ -204,7 +205,7 @@ def _branch(axes: Axes, branch: Branch, *, found: bool, fine: bool) -> None:
     if fine:
         axes.plot(x, branch.after_um, color=AFTER if found else BEFORE, linewidth=0.6)
         return
-    marks: dict[str, Any] = {"markersize": 3.0, "linewidth": 0.0, "elinewidth": 0.8, "marker": MARKER_OF[branch.sense]}
+    marks: LineStyle = {"markersize": 3.0, "linewidth": 0.0, "elinewidth": 0.8, "marker": MARKER_OF[branch.sense]}
     axes.errorbar(x, branch.before_um, 2.0 * branch.sigma_um, color=BEFORE, **marks)
     if found:
         axes.errorbar(x, branch.after_um, 2.0 * branch.sigma_um, color=AFTER, **marks)
@@ -212,9 +213,9 @@ def _branch(axes: Axes, branch: Branch, *, found: bool, fine: bool) -> None:
 
 
 def _legend_of_curves(part: SubFigure, axes: Axes, branches: Sequence[Branch], *, found: bool) -> None:
-    dot: dict[str, Any] = {"linewidth": 0.0, "marker": "o", "markersize": 3.0}
-    lines: dict[str, dict[str, Any]] = {"residual of the kinematic model": {"color": BEFORE, **dot}}
-    black: dict[str, Any] = {"color": "black", "linewidth": 1.0}
+    dot: LineStyle = {"linewidth": 0.0, "marker": "o", "markersize": 3.0}
+    lines: dict[str, LineStyle] = {"residual of the kinematic model": {"color": BEFORE, **dot}}
+    black: LineStyle = {"color": "black", "linewidth": 1.0}
     if found:
         lines |= {"joint model and its residual": {"color": AFTER, **dot}, "joint model": black}
     for sense in (branch.sense for branch in branches if branch.sense):
@@ -253,7 +254,7 @@ def _traces(part: SubFigure, gains: Sequence[GainOfTest], *, found: bool) -> Non
 
 
 def _legend_of_traces(part: SubFigure, axes: Axes, *, found: bool) -> None:
-    lines: dict[str, dict[str, Any]] = {"measured": {"color": MEASURED, "linewidth": 2.0, "alpha": 0.5}}
+    lines: dict[str, LineStyle] = {"measured": {"color": MEASURED, "linewidth": 2.0, "alpha": 0.5}}
     lines["kinematic model"] = {"color": BEFORE, "linewidth": 1.0}
     lines |= {"with causes found": {"color": AFTER, "linewidth": 1.0}} if found else {}
     legend_above(part, axes, lines | DIRECTIONS)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import matplotlib as mpl
 import numpy as np
@@ -14,6 +14,9 @@ from dbbstation.report.figure_format import as_svg
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from contextlib import AbstractContextManager
+
+    LineStyle: TypeAlias = dict[str, Any]
+    """Style of a line or marker, by the names of Matplotlib."""
 
     from matplotlib.axes import Axes
     from matplotlib.collections import QuadMesh
@@ -82,13 +85,13 @@ def zero_line(axes: Axes) -> None:
     axes.axhline(0.0, color="black", linewidth=0.5, linestyle=":")
 
 
-def legend_above(part: SubFigure, axes: Axes, lines: Mapping[str, Mapping[str, Any]]) -> None:
+def legend_above(part: SubFigure, axes: Axes, lines: Mapping[str, LineStyle]) -> None:
     """Write the legend of a part of a figure in one row, by label and style of each line."""
     handles = [axes.plot([], [], label=label, **style)[0] for label, style in lines.items()]
     part.legend(handles=handles, loc="upper right", ncols=len(handles), borderpad=0.0)
 
 
-DIRECTIONS: dict[str, dict[str, Any]] = {
+DIRECTIONS: dict[str, LineStyle] = {
     name.upper(): {"color": "black", "linewidth": 0.9, "linestyle": line} for name, line in LINE_OF_DIRECTION.items()
 }
 """Style of a direction of travel in a legend."""

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from dbbstation.circles.analysis import CircleAnalysis
     from dbbstation.plan.plan import PlannedTest
+    from dbbstation.report.drawing import LineStyle
     from dbbstation.report.sheet import Sheet
     from dbbstation.results.circles import MeasuredCircle
 
@@ -160,7 +161,7 @@ def _figures(drawn: Sequence[Drawn]) -> str:
     return ", ".join(f"{one.budget().value_um:.1f} {str(one.entry.direction).upper()}" for one in last)
 
 
-def _style(analysis: CircleAnalysis, *, thin: bool) -> dict[str, Any]:
+def _style(analysis: CircleAnalysis, *, thin: bool) -> LineStyle:
     ccw = analysis.raw.circle.direction is Direction.CCW
     return {
         "color": AFTER if ccw else BEFORE,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
+
+    from dbbstation.report.drawing import LineStyle
 
 STEP_IN = 0.05
 """Distance between successive trial positions of a label [inch]."""
@@ -114,7 +116,7 @@ class Key:
     """One entry of a legend."""
 
     text: str
-    style: dict[str, Any]
+    style: LineStyle
 
 
 class Sheet:

@@ -20,7 +20,7 @@ from dbbstation.sources.contract import Motion
 from dbbstation.trace.analysis import CircleFigures, figures
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.model.identified import IdentifiedModel
@@ -226,7 +226,7 @@ class EvaluatedTolerance:
     after: WorstRun | None
 
 
-def stated(tolerance: Tolerance) -> dict[str, Any]:
+def stated(tolerance: Tolerance) -> Mapping[str, Any]:
     """Return what a tolerance states, by name."""
     directions = tuple(direction.value for direction in tolerance.directions)
     found = {"quantity": tolerance.figure.value, "tests": tuple(tolerance.tests), "directions": directions}

@@ -200,9 +200,10 @@ class SessionStore:
             InputError: it exists and cannot be read.
             OutputError: the disk refuses.
         """
-        found, data = self._on_disk([])
+        found = read_bytes(self._file, [], is_input=False)
         if found is not None and hashlib.sha256(found).hexdigest() == self.sha256:
             return None
+        found, data = self._on_disk([])
         if data is None:
             self.put_aside = self._kept(found)
             self.sha256 = "" if found is None else hashlib.sha256(found).hexdigest()

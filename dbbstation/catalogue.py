@@ -210,5 +210,12 @@ def looked_up(
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return the nearest name as a question, or all known names."""
     names = list(known)
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    return f"did you mean {near[0]}?" if near else f"known are {', '.join(names)}"
+    return meant(name, names, f"known are {', '.join(names)}", "did you mean {}?")
+
+
+def meant(
+    name: str, known: Iterable[str], otherwise: str, asked: str = "did you mean `{}`?", likeness: float = 0.6
+) -> str:
+    """Return the nearest of the known names as a question, or other words if none is near."""
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=likeness)
+    return asked.format(near[0]) if near else otherwise

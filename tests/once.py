@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from dbbstation.files.inputs import input_book, note_input, note_read
+from dbbstation.files.inputs import input_book, note_input, open_book
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -121,7 +121,7 @@ def _note_read(read: _Read) -> None:
     for path, digest in read[0].items():
         note_input(path, digest)
     for path in read[1]:
-        note_read(path)
+        open_book().note_read(path)
 
 
 def _note_files(values: tuple[object, ...]) -> None:

@@ -18,7 +18,7 @@ from dbbstation.cli.output import echo, say
 from dbbstation.cli.progress import Compiling
 from dbbstation.computing.compiled import tell_of_compiling
 from dbbstation.errors import InputError, StationError, in_a_sentence
-from dbbstation.files.inputs import input_book, virtual_so_far
+from dbbstation.files.inputs import input_book, open_book
 from dbbstation.system.signals import politely_ended
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> No
             group.make_context(group.name, _own_first(given), obj=tuple(given)) as context,
         ):
             done = _invoked(group, context)
-            if virtual := virtual_so_far():
+            if virtual := tuple(open_book().virtual):
                 echo(f"VIRTUAL MACHINE: {', '.join(virtual)}: computed, and not measured on a real machine", err=True)
             flush_output()
             code = done if isinstance(done, int) else DONE

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
-    from dbbstation.virtual.path import CommandedPath
+    from dbbstation.virtual.machine import CommandedPath
 
 _LOOK_S = 0.2
 
@@ -124,7 +124,7 @@ def _truth(machine: Machine, file: Path | None, source_files: o.SourcePaths, see
 
 def _programs(folder: Path) -> Callable[[str], CommandedPath]:
     from dbbstation.station.programs import read_toolpath
-    from dbbstation.virtual.path import path_of
+    from dbbstation.virtual.machine import path_of
 
     def read(name: str) -> CommandedPath:
         path = folder / name

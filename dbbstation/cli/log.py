@@ -21,7 +21,7 @@ import click
 
 from dbbstation.cli.output import PROGRAM, command_of
 from dbbstation.errors import unwritable
-from dbbstation.files.inputs import inputs_so_far
+from dbbstation.files.inputs import open_book
 from dbbstation.files.places import session_around
 from dbbstation.system.handles import open_nothing, open_private
 from dbbstation.text.written import printable
@@ -108,7 +108,7 @@ def _log_beginning(context: click.Context) -> None:
     LOG.info("$ %s", shlex.join(["dbbstation", *given]))
     LOG.info("%s, Python %s, %s, in %s", PROGRAM, platform.python_version(), platform.platform(), Path.cwd())
     LOG.info(_versions())
-    for name, digest in inputs_so_far().items():
+    for name, digest in open_book().named().items():
         LOG.info("settings %s, sha256 %s", name, digest)
     if command_of(context) != shlex.join(["dbbstation", *given]):
         LOG.info("with settings, files without folders: %s", command_of(context))

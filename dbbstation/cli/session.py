@@ -282,8 +282,7 @@ def _missing(read: SessionFolder) -> list[str]:
     from dbbstation.files.formats.session import RunState
 
     done = {(run.test, run.direction) for run in read.in_state(RunState.ACCEPTED)}
-    planned = [(name, direction) for name, test in read.plan.tests.items() for direction in test.directions]
-    return [f"{name} {direction}" for name, direction in planned if (name, direction) not in done]
+    return [f"{name} {direction}" for name, direction in read.plan.runs() if (name, direction) not in done]
 
 
 def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunEntry:

@@ -129,16 +129,14 @@ _COMPILING = threading.RLock()
 """Lock that makes simultaneous first calls compile a kernel once."""
 
 
-def in_blocks(kernel: Callable[[int, int], None], count: int) -> None:
-    """Call `kernel(start, stop)` for blocks of `range(count)`, on all cores if worthwhile."""
-    workers = count // SMALLEST_BLOCK
-    if workers > 1:
-        workers = 1 if _is_worker() else min(os.cpu_count() or 1, workers)
-    if workers <= 1:
-        kernel(0, count)
+def in_blocks(kernel: Callable[..., None], count: int, *arguments: Any) -> None:  # noqa: ANN401 - those of the kernel
+    """Call `kernel(start, stop, *arguments)` for blocks of `range(count)`, on all cores if worthwhile."""
+    workers = min(os.cpu_count() or 1, count // SMALLEST_BLOCK)
+    if workers <= 1 or _is_worker():
+        kernel(0, count, *arguments)
         return
     edges = [count * worker // workers for worker in range(workers + 1)]
-    blocks = [_pool().submit(kernel, start, stop) for start, stop in pairwise(edges)]
+    blocks = [_pool().submit(kernel, start, stop, *arguments) for start, stop in pairwise(edges)]
     for block in blocks:
         block.result()
 

@@ -7,12 +7,12 @@ so the limit ends with the fit.
 from __future__ import annotations
 
 import threading
+from concurrent.futures import Future
 from functools import cache, wraps
-from typing import TYPE_CHECKING, Generic, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import TracebackType
 
     from threadpoolctl import LibController
 
@@ -47,9 +47,7 @@ class _Limit:
                 for library, _ in self._before:
                     _set(library, 1)
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with self._lock:
             self._working -= 1
             if self._working == 0:
@@ -83,34 +81,15 @@ def _libraries() -> list[LibController]:
 _Outcome = TypeVar("_Outcome")
 
 
-class Background(Generic[_Outcome]):
-    """A function call that starts at once in a thread."""
+def in_background(work: Callable[[], _Outcome]) -> Future[_Outcome]:
+    """Start a call in a thread that does not keep the program from ending."""
+    found: Future[_Outcome] = Future()
 
-    def __init__(self, work: Callable[[], _Outcome]) -> None:
-        self._work = work
-        self._found: list[_Outcome] = []
-        self._error: Exception | None = None
-        self._thread = threading.Thread(target=self._run, name="background", daemon=True)
-        self._thread.start()
-
-    @property
-    def done(self) -> bool:
-        """Return whether the call has ended."""
-        return not self._thread.is_alive()
-
-    def outcome(self) -> _Outcome:
-        """Wait for the call and return its result, or raise its error."""
-        self._thread.join()
-        if self._error is not None:
-            raise self._error
-        return self._found[0]
-
-    def wait(self, limit_s: float | None = None) -> None:
-        """Wait for the call's end, at most `limit_s` seconds."""
-        self._thread.join(limit_s)
-
-    def _run(self) -> None:
+    def run() -> None:
         try:
-            self._found.append(self._work())
-        except Exception as error:  # noqa: BLE001 - raised again where the outcome is fetched
-            self._error = error
+            found.set_result(work())
+        except BaseException as error:  # noqa: BLE001 - raised again where the result is fetched
+            found.set_exception(error)
+
+    threading.Thread(target=run, name="background", daemon=True).start()
+    return found

@@ -22,6 +22,15 @@ _MISTAKEN: dict[str, tuple[tuple[str, float], ...]] = {
 _KELVIN_AT_0_DEGC = 273.15
 
 
+def complaint(what: str, kind: str = "wrong") -> PydanticCustomError:
+    """Return the error of a value in a file, in words.
+
+    Args:
+        kind: `implausible` if its unit may be wrong.
+    """
+    return PydanticCustomError(kind, "{what}", {"what": what})
+
+
 @dataclass(frozen=True)
 class Quantity:
     """A number in a unit, with the range of plausible sizes.
@@ -50,11 +59,8 @@ class Quantity:
         """
         if self.fits(value):
             return value
-        raise PydanticCustomError(
-            "implausible",
-            "{value} is not plausible, expected {range}{guess}",
-            {"value": f"{value:g} {self.unit}".strip(), "range": self.range, "guess": self.guess(value)},
-        )
+        shown = f"{value:g} {self.unit}".strip()
+        raise complaint(f"{shown} is not plausible, expected {self.range}{self.guess(value)}", "implausible")
 
     def guess(self, value: float) -> str:
         """Return the unit that an implausible value suggests, or an empty text."""
@@ -97,16 +103,8 @@ class Reach:
         """Return the point; raise an error with its distance if it is too far."""
         distance = math.hypot(*point)
         if not self.distance.fits(distance):
-            raise PydanticCustomError(
-                "implausible",
-                "is {value} mm from the origin, expected {least} to {most} mm{guess}",
-                {
-                    "value": f"{distance:g}",
-                    "least": f"{self.distance.least:g}",
-                    "most": f"{self.distance.most:g}",
-                    "guess": self.distance.guess(distance),
-                },
-            )
+            expected = f"{self.distance.least:g} to {self.distance.most:g} mm{self.distance.guess(distance)}"
+            raise complaint(f"is {distance:g} mm from the origin, expected {expected}", "implausible")
         return point
 
 
@@ -120,13 +118,10 @@ class Rising:
         """Return the pair; raise an error with its span if this is implausible."""
         low, high = pair
         if high < low:
-            raise PydanticCustomError("falling", "the lower limit must come first", {})
+            raise complaint("the lower limit must come first")
         if not self.span.fits(high - low):
-            raise PydanticCustomError(
-                "implausible",
-                "the limits are {value} {unit} apart, which is not plausible{guess}",
-                {"value": f"{high - low:g}", "unit": self.span.unit, "guess": self.span.guess(high - low)},
-            )
+            apart = f"{high - low:g} {self.span.unit} apart, which is not plausible{self.span.guess(high - low)}"
+            raise complaint(f"the limits are {apart}", "implausible")
         return pair
 
 

@@ -25,7 +25,9 @@ from pydantic import (
 )
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, PydanticCustomError, PydanticKnownError, core_schema
+from pydantic_core import CoreSchema, PydanticKnownError, core_schema
+
+from dbbstation.facts.quantities import complaint
 
 STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 """Options of every part of a file: strict types, no unknown keys, finite numbers."""
@@ -103,9 +105,7 @@ def _moment(given: object) -> object:
     except ValueError:
         moment = None
     if moment is None or moment.tzinfo is None:
-        raise PydanticCustomError(
-            "moment", "`{text}` is not a time with its zone, such as 2026-11-20T08:04:11Z", {"text": given}
-        )
+        raise complaint(f"`{given}` is not a time with its zone, such as 2026-11-20T08:04:11Z")
     return moment
 
 
@@ -113,7 +113,7 @@ def _day(text: str) -> str:
     try:
         date.fromisoformat(text)
     except ValueError:
-        raise PydanticCustomError("day", "`{text}` is not a date", {"text": text}) from None
+        raise complaint(f"`{text}` is not a date") from None
     return text
 
 

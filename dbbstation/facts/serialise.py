@@ -99,5 +99,4 @@ def read_plain(kind: type[_Kind], data: Mapping[str, object]) -> _Kind:
     Raises:
         ValueError: a key is missing, or its value is of another type.
     """
-    found: _Kind = adapter(kind).validate_python(data)
-    return found
+    return adapter(kind).validate_python(data)

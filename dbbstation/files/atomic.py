@@ -12,18 +12,17 @@ import os
 import re
 import stat
 import tempfile
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, BinaryIO
 
 from dbbstation.errors import OutputError, unwritable
-from dbbstation.files.inputs import was_read
+from dbbstation.files.inputs import open_book
 from dbbstation.files.places import real_path, refuse_recorded
 from dbbstation.system.handles import may_write, open_private
 from dbbstation.system.replacing import remove, remove_tree, rename, replace, sync_folder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
-    from pathlib import PurePath
 
 _LOG = logging.getLogger(__name__)
 
@@ -110,7 +109,7 @@ def write_folder(
             made = Path(tempfile.mkdtemp(prefix=f".{folder.name}", suffix=_MARK, dir=folder.parent))
             try:
                 made.chmod(_usual_mode(0o777))
-                _fill(made, files, read_only)
+                _replace_all(made, files, read_only)
                 rename(made, folder)
             except BaseException:
                 remove_tree(made)
@@ -168,7 +167,7 @@ def refuse_outputs(paths: Iterable[Path | None], *, force: bool) -> None:
 
 
 def _refuse_input(path: Path) -> None:
-    if was_read(path):
+    if open_book().was_read(path):
         what = "this file was read just now: the result would take its place"
         raise OutputError(what, where=str(path), remedy="name another file")
 
@@ -219,18 +218,6 @@ def set_read_only(path: Path) -> None:
 _WRITE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
 
-def _fill(folder: Path, files: Mapping[str, str | bytes], read_only: Callable[[str], bool]) -> None:
-    for name, content in files.items():
-        path = folder / name
-        if name.endswith("/"):
-            path.mkdir(parents=True, exist_ok=True)
-            continue
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _write_whole(path, content, read_only=read_only(name))
-    for inner in {folder, *(path for path in folder.rglob("*") if path.is_dir())}:
-        sync_folder(inner)
-
-
 def _replace_all(folder: Path, files: Mapping[str, str | bytes], read_only: Callable[[str], bool]) -> None:
     written: list[tuple[Path, Path]] = []
     try:
@@ -240,14 +227,17 @@ def _replace_all(folder: Path, files: Mapping[str, str | bytes], read_only: Call
             if not name.endswith("/"):
                 temporary = _temporary(path)
                 written.append((temporary, path))
-                _write_whole(temporary, content, read_only=read_only(name))
+                with _synced(temporary) as file:
+                    file.write(content.encode() if isinstance(content, str) else content)
+                if read_only(name):
+                    set_read_only(temporary)
         for temporary, path in written:
             replace(temporary, path)
     except BaseException:
         for temporary, _ in written:
             remove(temporary)
         raise
-    for parent in {path.parent for _, path in written}:
+    for parent in {folder / parent for name in files for parent in PurePath(name).parents}:
         sync_folder(parent)
 
 
@@ -256,7 +246,8 @@ def _temporary(path: Path) -> Path:
     os.close(handle)
     temporary = Path(name)
     # mkstemp makes files that only their owner can read.
-    temporary.chmod(path.stat().st_mode & 0o777 if path.exists() else _usual_mode(_wanted_mode(path)))
+    wanted = 0o600 if _WITH_NAMES.fullmatch(path.name) else 0o666
+    temporary.chmod(path.stat().st_mode & 0o777 if path.exists() else _usual_mode(wanted))
     return temporary
 
 
@@ -264,17 +255,6 @@ def _usual_mode(wanted: int) -> int:
     mask = os.umask(0)
     os.umask(mask)
     return wanted & ~mask
-
-
-def _wanted_mode(path: Path) -> int:
-    return 0o600 if _WITH_NAMES.fullmatch(path.name) else 0o666
-
-
-def _write_whole(path: Path, content: str | bytes, *, read_only: bool) -> None:
-    with _synced(path) as file:
-        file.write(content.encode() if isinstance(content, str) else content)
-    if read_only:
-        set_read_only(path)
 
 
 @contextlib.contextmanager

@@ -20,7 +20,7 @@ from dbbstation.files.formats.session import PART, RunState, SessionFile
 from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.formats.settings_schema import SettingsFile
 from dbbstation.files.formats.simulator import SimulatorFile, parse_simulator
-from dbbstation.files.inputs import note_virtual
+from dbbstation.files.inputs import open_book
 from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
 from dbbstation.files.recordings.event_log import SHORTEST, anchor_of, read_event_log, set_back
@@ -271,7 +271,7 @@ def _session(checked: Checked) -> None:
     checked.summary = f"session: {_states(session)}; {_seal(session)}"
     checked.virtual = session.virtual
     if session.virtual:
-        note_virtual(session.name)
+        open_book().note_virtual(session.name)
 
 
 def _amended(checked: Checked, session: SessionFolder) -> None:

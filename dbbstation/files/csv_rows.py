@@ -57,16 +57,13 @@ def csv_rows(
         InputError: a cell is too long, for example after an unclosed quotation mark.
     """
     reader = csv.reader(lines, delimiter=separator, skipinitialspace=skip_spaces)
-    while True:
-        try:
-            cells = next(reader)
-        except StopIteration:
-            return
-        except csv.Error as error:
-            line = first_line - 1 + reader.line_num
-            what = f"a cell has more than {csv.field_size_limit():,} characters"
-            raise InputError.of(file, what, "check its quotation marks, or name another file", line=line) from error
-        yield first_line - 1 + reader.line_num, cells
+    try:
+        for cells in reader:
+            yield first_line - 1 + reader.line_num, cells
+    except csv.Error as error:
+        what = f"a cell has more than {csv.field_size_limit():,} characters"
+        line = first_line - 1 + reader.line_num
+        raise InputError.of(file, what, "check its quotation marks, or name another file", line=line) from error
 
 
 def csv_cells(line: str, separator: str, file: str, number: int) -> list[str]:

@@ -99,6 +99,11 @@ def head_of(path: Path, most: int) -> bytes:
         return source.read(most)
 
 
+def sha256_hex(data: bytes | str) -> str:
+    """Return the SHA-256 of bytes, or of a text in UTF-8."""
+    return hashlib.sha256(data.encode() if isinstance(data, str) else data).hexdigest()
+
+
 def digest_of(path: Path) -> str:
     """Return a file's SHA-256 in hexadecimal, read in blocks."""
     digest = hashlib.sha256()

@@ -62,7 +62,7 @@ class InputBook:
 _BOOK: ContextVar[InputBook | None] = ContextVar("inputs", default=None)
 
 
-def _book() -> InputBook:
+def open_book() -> InputBook:
     """Return the open book, or a new one that is discarded."""
     return _BOOK.get() or InputBook()
 
@@ -92,36 +92,11 @@ def in_a_book(task: Callable[Given, Result]) -> Callable[Given, Result]:
 def note_input(path: Path, digest: str) -> None:
     """Note and log a file that was read."""
     _LOG.info("read %s, sha256 %s", path, digest)
-    _book().note(path, digest)
+    open_book().note(path, digest)
 
 
 def note_known(path: Path, digest: str) -> None:
     """Note a file known from an earlier reading."""
-    book = _book()
+    book = open_book()
     book.note(path, digest)
     book.note_read(path)
-
-
-def note_virtual(name: str) -> None:
-    """Note that an input of this name comes from a virtual machine."""
-    _book().note_virtual(name)
-
-
-def virtual_so_far() -> tuple[str, ...]:
-    """Return the names of all read sessions and models of virtual machines."""
-    return tuple(_book().virtual)
-
-
-def note_read(path: Path) -> None:
-    """Note a file that no output may replace."""
-    _book().note_read(path)
-
-
-def was_read(path: Path) -> bool:
-    """Return whether this command has read a file; False without a book."""
-    return _book().was_read(path)
-
-
-def inputs_so_far() -> dict[str, str]:
-    """Return the SHA-256 of every read input by name; empty without a book."""
-    return _book().named()

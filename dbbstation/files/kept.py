@@ -6,13 +6,13 @@ SQLite runs without a write-ahead log and never on a network share.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import logging
 import os
 import sqlite3
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
+from dbbstation.files.gateway import sha256_hex
 from dbbstation.files.keys import key_of
 from dbbstation.files.places import real_path
 from dbbstation.system.mounts import file_system
@@ -47,12 +47,9 @@ def stamp_of(path: Path, *others: Path) -> Stamp:
     Raises:
         OSError: one is missing.
     """
-    stat = path.stat()
-    if not others:
-        return Stamp(stat.st_mtime_ns, stat.st_size)
     stats = [(str(one), one.stat()) for one in (path, *others)]
-    all_of_it = repr([(name, one.st_mtime_ns, one.st_size) for name, one in stats]).encode()
-    return Stamp(int(hashlib.sha256(all_of_it).hexdigest()[:15], 16), sum(one.st_size for _, one in stats))
+    all_of_it = repr([(name, one.st_mtime_ns, one.st_size) for name, one in stats])
+    return Stamp(int(sha256_hex(all_of_it)[:15], 16), sum(one.st_size for _, one in stats))
 
 
 @dataclass(frozen=True)
@@ -218,7 +215,7 @@ def index_file(folder: Path) -> Path:
     """Return the index file of a folder: in the cache, under a hash of its path."""
     import platformdirs  # noqa: PLC0415 - only a history looks for it
 
-    digest = hashlib.sha256(os.fsencode(real_path(folder))).hexdigest()[:24]
+    digest = sha256_hex(os.fsencode(real_path(folder)))[:24]
     return platformdirs.user_cache_path("dbbstation", appauthor=False) / "history" / f"{digest}.sqlite"
 
 

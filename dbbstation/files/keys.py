@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from dbbstation import __version__
 from dbbstation.files.formats.session import RunState
-from dbbstation.files.gateway import content_of, digest_of
+from dbbstation.files.gateway import content_of, digest_of, sha256_hex
 from dbbstation.files.places import SESSION_FILE
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def key_of(request: Mapping[str, Any], inputs: Iterable[tuple[str, str]] = ()) -
         inputs: name and SHA-256 of each file, in any order.
     """
     what = {"request": request, "inputs": sorted(inputs), "program": program_identity()}
-    return hashlib.sha256(json.dumps(what, sort_keys=True, default=str).encode()).hexdigest()
+    return sha256_hex(json.dumps(what, sort_keys=True, default=str))
 
 
 def digests_of(paths: Iterable[Path], folder: Path) -> list[tuple[str, str]]:

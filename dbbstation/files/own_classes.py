@@ -6,7 +6,6 @@ A file is run as Python code: name only trusted files.
 from __future__ import annotations
 
 import ast
-import hashlib
 import os
 import sys
 from inspect import isabstract
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from dbbstation.catalogue import FOREIGN, FoundClass, classes_of, in_words, line_in
 from dbbstation.errors import Problem, refuse
+from dbbstation.files.gateway import sha256_hex
 from dbbstation.files.places import real_path
 from dbbstation.files.source_text import LARGEST_PROGRAM, text_in
 from dbbstation.laws.contract import TableSource
@@ -97,7 +97,7 @@ def own_instances(
 
 def module_name(path: Path) -> str:
     """Return a name that no other file has."""
-    return f"dbbstation_own_{hashlib.sha256(os.fsencode(real_path(path))).hexdigest()[:16]}"
+    return f"dbbstation_own_{sha256_hex(os.fsencode(real_path(path)))[:16]}"
 
 
 def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:

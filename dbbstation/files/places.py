@@ -88,11 +88,7 @@ def refuse_recorded(path: Path) -> None:
 def _is_session(folder: Path) -> bool:
     file = folder / SESSION_FILE
     try:
-        if not file.is_file():
-            return False
-        if (folder / "runs").is_dir():
-            return True
-        return _MARK in head_of(file, _WITHIN)
+        return file.is_file() and ((folder / RUNS).is_dir() or _MARK in head_of(file, _WITHIN))
     except OSError:
         return False
 

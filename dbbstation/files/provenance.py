@@ -15,7 +15,7 @@ from dbbstation import __version__
 from dbbstation.facts.record import Record, Sha256Hex
 from dbbstation.facts.serialise import adapter
 from dbbstation.files.atomic import refuse_existing, write_folder
-from dbbstation.files.inputs import inputs_so_far, virtual_so_far
+from dbbstation.files.inputs import open_book
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -97,7 +97,7 @@ def write_table(path: Path, text: str, provenance: Provenance, *, force: bool = 
 
 def made_by(command: str) -> Provenance:
     """Return the provenance of a command's output, with the inputs read so far."""
-    return Provenance(f"dbbstation {__version__}", command, inputs_so_far(), virtual_so_far())
+    return Provenance(f"dbbstation {__version__}", command, open_book().named(), tuple(open_book().virtual))
 
 
 def from_python() -> Provenance:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeVar, TypeVarTuple, Unpack
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.gateway import LARGEST_BYTES, NotRegularError, TooLargeError, content_of, opened
-from dbbstation.files.inputs import note_input, note_read
+from dbbstation.files.gateway import LARGEST_BYTES, NotRegularError, TooLargeError, content_of, opened, sha256_hex
+from dbbstation.files.inputs import note_input, open_book
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from pathlib import Path
 
 _Found = TypeVar("_Found")
+_Given = TypeVarTuple("_Given")
 
 
 def read_bytes(
@@ -29,9 +30,9 @@ def read_bytes(
     except OSError as error:
         faults.append(unreadable(path, error))
         return None
-    note_read(path)
+    open_book().note_read(path)
     if is_input:
-        note_input(path, hashlib.sha256(data).hexdigest())
+        note_input(path, sha256_hex(data))
     return data
 
 
@@ -49,7 +50,7 @@ def blocks_of(path: Path) -> Iterator[bytes]:
                 yield block
     except OSError as error:
         raise InputError([unreadable(path, error)]) from error
-    note_read(path)
+    open_book().note_read(path)
     note_input(path, digest.hexdigest())
 
 
@@ -74,12 +75,8 @@ def first_line(path: Path) -> bytes:
         OSError: it cannot be read.
     """
     with opened(path) as source:
-        return next((line for line in lines_of(source.blocks()) if not is_comment(line)), b"")
-
-
-def is_comment(line: bytes) -> bool:
-    """Return whether a line is empty or begins with `#`, byte order mark allowed."""
-    return line.lstrip(_SPACE)[:1] in {b"", b"#"}
+        lines = lines_of(source.blocks())
+        return next((line for line in lines if line.lstrip(_SPACE)[:1] not in {b"", b"#"}), b"")
 
 
 def lines_of(blocks: Iterable[bytes]) -> Iterator[bytes]:
@@ -123,14 +120,14 @@ def decode(data: bytes, file: str, faults: list[Problem]) -> str | None:
     return None
 
 
-def without_faults(read: Callable[[list[Problem]], _Found | None]) -> _Found:
+def without_faults(read: Callable[[Unpack[_Given], list[Problem]], _Found | None], *given: *_Given) -> _Found:
     """Call a reader that adds to a list of faults, and return its result.
 
     Raises:
         InputError: every fault with its place.
     """
     faults: list[Problem] = []
-    found = read(faults)
+    found = read(*given, faults)
     if found is None or faults:
         raise InputError(faults)
     return found

@@ -60,13 +60,10 @@ def average_run_length(chart: Chart, mean: float = 0.0) -> float:
 
     The rates of both directions add up [Kemp 1961, J. R. Stat. Soc. B 23, 149].
     """
-    rates = [1.0 / _one_sided(chart, side * mean) for side in (1.0, -1.0)]
-    return 1.0 / sum(rates)
-
-
-def _one_sided(chart: Chart, mean: float) -> float:
-    lengths = np.linalg.solve(np.eye(STATES) - transitions(chart, mean), np.ones(STATES))
-    return float(lengths[0])
+    lengths = (
+        np.linalg.solve(np.eye(STATES) - transitions(chart, side * mean), np.ones(STATES)) for side in (1.0, -1.0)
+    )
+    return 1.0 / sum(1.0 / float(length[0]) for length in lengths)
 
 
 @cache

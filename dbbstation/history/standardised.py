@@ -123,4 +123,4 @@ def _normal(residual: Floats, scatter: Floats, freedom: Integers) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(residual == 0.0, 0.0, residual / scatter)
     beyond = stdtr(freedom.astype(np.float64), -np.abs(ratio))
-    return np.asarray(-np.sign(ratio) * ndtri(np.maximum(beyond, _SMALLEST)), dtype=np.float64)
+    return -np.sign(ratio) * ndtri(np.maximum(beyond, _SMALLEST))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import sqrt
 from statistics import fmean
 from typing import TYPE_CHECKING
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from dbbstation.history.run_length import Chart
     from dbbstation.history.watch import Watched
     from dbbstation.plan.tolerance import Tolerance
+
+    _Series = list[tuple[int, float, float]]  # sessions, values, their u
 
 FALSE_ALARMS = 1e-3
 """False alarms per session of a machine over all its quantities: one in a thousand sessions, or nineteen years of
@@ -111,13 +113,6 @@ class MachineHistory:
     expected: float
 
 
-@dataclass
-class _Series:
-    at: list[int] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
-    u: list[float] = field(default_factory=list)
-
-
 @dataclass(frozen=True)
 class TrendOptions:
     """Options of trends.
@@ -158,7 +153,7 @@ def _history(
     machine: str, sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures], asked: TrendOptions
 ) -> MachineHistory:
     series = _circle_series(sessions, asked) | _parameter_series(sessions, models)
-    numbers = {subject: (np.array(one.at), np.array(one.values), np.array(one.u)) for subject, one in series.items()}
+    numbers = {subject: tuple(map(np.array, zip(*one, strict=True))) for subject, one in series.items()}
     reasons = {subject: _why_not(subject, u) for subject, (_, _, u) in numbers.items()}
     count = sum(not reason for reason in reasons.values())
     chart = chart_for(asked.false_alarms / count) if count else None
@@ -191,15 +186,12 @@ def _circle_series(sessions: Sequence[SessionFigures], asked: TrendOptions) -> d
                 runs.setdefault((run.test, run.direction, run.circle), []).append(run.figures)
         for (test, direction, circle), repeats in runs.items():
             for place, figure in enumerate(repeats[0]):
-                one = found.setdefault(Subject(figure.name, test, direction, circle), _Series())
-                one.at.append(k)
-                if len(repeats) == 1:  # most runs have one repeat; means would double the time to open a history
-                    one.values.append(figure.value_um)
-                    one.u.append(figure.stated_u_um)
-                    continue
-                one.values.append(fmean(figures[place].value_um for figures in repeats))
-                # Averaging removes only independent errors; stated uncertainties are mostly errors common to repeats.
-                one.u.append(sqrt(fmean(figures[place].stated_u_um ** 2 for figures in repeats)))
+                value, u = figure.value_um, figure.stated_u_um
+                if len(repeats) > 1:  # most runs have one repeat; means would double the time to open a history
+                    value = fmean(figures[place].value_um for figures in repeats)
+                    # Averaging removes only independent errors; stated uncertainties are mostly errors common to repeats.
+                    u = sqrt(fmean(figures[place].stated_u_um ** 2 for figures in repeats))
+                found.setdefault(Subject(figure.name, test, direction, circle), []).append((k, value, u))
     order = sorted(found, key=lambda s: (s.test, s.direction, s.of, _FIRST.get(s.figure, len(_FIRST))))
     return {subject: found[subject] for subject in order}
 
@@ -211,10 +203,8 @@ def _parameter_series(sessions: Sequence[SessionFigures], models: Mapping[str, M
         for parameter in () if model is None else model.parameters:
             beside = tuple(sorted(source for source in model.sources if source != parameter.source)) if model else ()
             subject = Subject(parameter.name, "", "", parameter.source, parameter.unit, beside)
-            one = found.setdefault(subject, _Series())
-            one.at.append(k)
-            one.values.append(parameter.value)
-            one.u.append(np.nan if parameter.u is None else parameter.u)
+            u = np.nan if parameter.u is None else parameter.u
+            found.setdefault(subject, []).append((k, parameter.value, u))
     return found
 
 

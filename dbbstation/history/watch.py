@@ -136,10 +136,6 @@ def watch(
     return looked
 
 
-AT_FIRST = 32
-"""Number of values of a level that are checked first."""
-
-
 def _look(
     values: Floats,
     u: Floats,
@@ -155,13 +151,9 @@ def _look(
     start, out, pooled = 0, list[int](), ScatterRatio()
     while True:
         at = np.array([k for k in range(start, count) if k not in out], dtype=np.intp)
-        for some in (at[:AT_FIRST], at):  # an early change is found without processing all values
-            held = standardised(values[some], u[some], baseline, pooled, hindsight)
-            stretch = _Stretch(some, held, values[some], u[some], chart, coverage_factor)
-            found = stretch.first_event()
-            if found is not None or len(some) == len(at):
-                at = some
-                break
+        held = standardised(values[at], u[at], baseline, pooled, hindsight)
+        stretch = _Stretch(at, held, values[at], u[at], chart, coverage_factor)
+        found = stretch.first_event()
         end = count if found is None else found.found + 1
         inside = at < end
         z[at[inside]], high[at[inside]], low[at[inside]] = (x[inside] for x in (held.z, *stretch.sums))

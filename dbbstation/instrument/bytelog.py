@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Literal
 
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.gateway import opened
-from dbbstation.files.inputs import note_read
+from dbbstation.files.inputs import open_book
 from dbbstation.files.source_text import lines_of, unreadable
 from dbbstation.system.handles import Closing
 
@@ -135,7 +135,7 @@ def _lines(path: Path) -> Generator[tuple[int, str]]:
     number = 0
     try:
         with opened(path) as source:
-            note_read(path)
+            open_book().note_read(path)
             for number, (line, _) in enumerate(pairwise(lines_of(source.blocks())), start=1):
                 if number > 1:
                     yield number, line.decode("utf-8").removesuffix("\r")

@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, TypeAlias
 from dbbstation.errors import InstrumentError
 from dbbstation.instrument.damaged import damaged_in
 from dbbstation.instrument.doubt import Piece, Written
-from dbbstation.instrument.fields import Content, FrameParts, Literally, NotRepresentable, NotUnderstood, Reason
+from dbbstation.instrument.fields import Content, FrameParts, NotRepresentable, NotUnderstood, Reason
 from dbbstation.instrument.reading import Reading, Status
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from dbbstation.instrument.frame import Frame
     from dbbstation.instrument.protocol import Protocol
 
@@ -98,38 +96,33 @@ class Decoder:
         self._protocol = protocol
         self._joining = joining
         self._in_step = not joining
-        self._pending = b""
-        self._heads = [_head(frame) for frame in protocol.frames]
-        self._bare = tuple(b"".join(_fixed(frame)) for frame in protocol.frames if frame.bare)
-
-    @property
-    def pending(self) -> bytes:
-        """Return the pending bytes: the begin of a frame, or garbage at the end."""
-        return self._pending
+        self.pending = b""
+        self._heads = [frame.literal(0) for frame in protocol.frames]
+        self._bare = tuple(frame.write(Content(0.0)) for frame in protocol.frames if frame.bare)
 
     def take_pending(self) -> bytes:
         """Return and clear the pending bytes."""
-        raw, self._pending = self._pending, b""
+        raw, self.pending = self.pending, b""
         return raw
 
     def feed(self, chunk: bytes) -> list[Heard]:
         """Return the readings and garbage that `chunk` completed, in wire order."""
-        self._pending += chunk
+        self.pending += chunk
         return self._cut_by_width() if self._protocol.by_width else self._cut_by_line_end()
 
     def _cut_by_line_end(self) -> list[Heard]:
         end = self._protocol.terminator
         heard: list[Heard] = []
         while True:
-            bare = next((raw for raw in self._bare if self._pending.startswith(raw)), None)
+            bare = next((raw for raw in self._bare if self.pending.startswith(raw)), None)
             if bare is not None:
                 raw = bare
             else:
-                cut = self._pending.find(end)
+                cut = self.pending.find(end)
                 if cut < 0:
                     break
-                raw = self._pending[: cut + len(end)]
-            self._pending = self._pending[len(raw) :]
+                raw = self.pending[: cut + len(end)]
+            self.pending = self.pending[len(raw) :]
             joining, self._joining = self._joining, False
             if joining and bare is None:
                 # Its beginning is unknown: where widths vary, "23.4" may be the rest of "123.4".
@@ -137,10 +130,10 @@ class Decoder:
                 continue
             try:
                 reading, written = _decoded(self._protocol, raw)
-                heard.append(Piece(reading, raw, len(self._pending), written))
+                heard.append(Piece(reading, raw, len(self.pending), written))
             except NotUnderstood as error:
                 heard.append(self._not_understood(raw, error))
-        if len(self._pending) > LONGEST_LINE:
+        if len(self.pending) > LONGEST_LINE:
             heard.append(Garbage(self.take_pending(), f"no line end in {LONGEST_LINE} bytes"))
         return heard
 
@@ -157,58 +150,50 @@ class Decoder:
         heard: list[Heard] = []
         start = skipped = 0
         wrong: NotUnderstood | None = None
-        while len(self._pending) - start - skipped >= longest:
+        while len(self.pending) - start - skipped >= longest:
             here = start + skipped
             found = self._frame_at(here)
             if isinstance(found, NotUnderstood):
                 wrong, found = wrong or found, None
             if found is not None and not self._in_step:
                 follower = here + len(found.raw)
-                if len(self._pending) - follower < longest:
+                if len(self.pending) - follower < longest:
                     break
                 found = found if isinstance(self._frame_at(follower), Piece) else None
             if found is None:
                 self._in_step = False
-                skipped = self._next_head(here + 1, len(self._pending) - longest + 1) - start
+                skipped = self._next_head(here + 1, len(self.pending) - longest + 1) - start
                 continue
             if skipped:
-                heard.append(_skipped(self._pending[start:here], wrong, joining=self._joining))
+                heard.append(_skipped(self.pending[start:here], wrong, joining=self._joining))
             heard.append(found)
             start, skipped, wrong = here + len(found.raw), 0, None
             self._in_step, self._joining = True, False
         if skipped and (not self._joining or skipped > LONGEST_LINE):
-            heard.append(_skipped(self._pending[start : start + skipped], wrong, joining=False))
+            heard.append(_skipped(self.pending[start : start + skipped], wrong, joining=False))
             start += skipped
-        self._pending = self._pending[start:]
+        self.pending = self.pending[start:]
         return heard
 
     def _next_head(self, after: int, end: int) -> int:
+        """Return the next place before `end` where the first bytes of a frame may be."""
         if not all(self._heads):
             return after
-        places = [self._pending.find(head, after, end + len(head) - 1) for head in self._heads]
+        places = [self.pending.find(head, after, end + len(head) - 1) for head in self._heads]
         return min((place for place in places if place >= 0), default=max(after, end))
 
     def _frame_at(self, start: int) -> Piece | NotUnderstood | None:
         wrong: NotUnderstood | None = None
         for frame in self._protocol.frames:
-            match = frame.pattern.match(self._pending, start)
+            match = frame.pattern.match(self.pending, start)
             if match is not None:
                 try:
                     reading, written = _reading(self._protocol, frame.read(match))
                 except NotUnderstood as error:
                     wrong = error
                     continue
-                return Piece(reading, match[0], len(self._pending) - match.end(), written)
+                return Piece(reading, match[0], len(self.pending) - match.end(), written)
         return wrong
-
-
-def _head(frame: Frame) -> bytes:
-    first = frame.parts[0]
-    return first.value if isinstance(first, Literally) else b""
-
-
-def _fixed(frame: Frame) -> Iterator[bytes]:
-    return (part.value for part in frame.parts if isinstance(part, Literally))
 
 
 def _skipped(raw: bytes, wrong: NotUnderstood | None, *, joining: bool) -> Garbage:

@@ -25,8 +25,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import Self
 
+    from serial.tools.list_ports_common import ListPortInfo
+
     from dbbstation.instrument.bytelog import ByteLog
-    from dbbstation.instrument.link import Adapter, Link, Port
+    from dbbstation.instrument.link import Link, Port
     from dbbstation.instrument.protocol import LineCommand, Protocol
     from dbbstation.instrument.reading import Reading
 
@@ -160,7 +162,7 @@ class Instrument(Closing):
         self._timeout_s = timeout_s or protocol.timing.timeout_s
         self._memory_s = memory_s
         self._reconnect_s = reconnect_s
-        self._adapter: Adapter | None = None
+        self._adapter: ListPortInfo | None = None
         self._last_s: float | None = None
         self._away = False
         self._link: Link | None = None

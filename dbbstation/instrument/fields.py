@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
@@ -148,9 +148,7 @@ class SignField(Schema):
             raise ValueError("plus and minus list single characters, at least one each")
         return self
 
-    @property
-    def width(self) -> int:
-        return 1
+    width: ClassVar[int] = 1
 
     def pattern(self) -> bytes:
         return b"[" + re.escape(b"".join(self.plus + self.minus)) + b"]"
@@ -204,9 +202,7 @@ class Flags(Schema):
     base: int = Field(default=0, ge=0, le=255)
     bits: tuple[Bit, ...] = Field(min_length=1)
 
-    @property
-    def width(self) -> int:
-        return 1
+    width: ClassVar[int] = 1
 
     def pattern(self) -> bytes:
         free = sum(1 << bit.bit for bit in self.bits)

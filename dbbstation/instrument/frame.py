@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
@@ -44,10 +44,7 @@ class Optionally(Schema):
     feature: str = Field(min_length=1)
     parts: tuple[PlainPart, ...] = Field(min_length=1)
 
-    @property
-    def width(self) -> None:
-        """Return None: the width varies."""
-        return
+    width: ClassVar[None] = None
 
     def pattern(self) -> bytes:
         """Return the pattern of all parts or nothing."""
@@ -77,7 +74,11 @@ class Optionally(Schema):
 
     @cached_property
     def _pattern(self) -> re.Pattern[bytes]:
-        return re.compile(b"".join(b"(" + part.pattern() + b")" for part in self.parts))
+        return _grouped(self.parts)
+
+
+def _grouped(parts: tuple[Part, ...]) -> re.Pattern[bytes]:
+    return re.compile(b"".join(b"(" + part.pattern() + b")" for part in parts))
 
 
 Part: TypeAlias = Annotated[_Plain | Checksum | Optionally, Field(discriminator="kind")]
@@ -133,11 +134,10 @@ class Frame(Schema):
         widths = [part.width for part in self.parts]
         return None if None in widths else sum(width for width in widths if width is not None)
 
-    @property
-    def terminator(self) -> bytes:
-        """Return the fixed bytes at the frame's end; may be empty."""
-        last = self.parts[-1]
-        return last.value if isinstance(last, Literally) else b""
+    def literal(self, place: int) -> bytes:
+        """Return the bytes of a part of the frame, counted from 0 or from -1 at its end; empty if they vary."""
+        part = self.parts[place]
+        return part.value if isinstance(part, Literally) else b""
 
     @property
     def binary(self) -> bool:
@@ -152,7 +152,7 @@ class Frame(Schema):
     @cached_property
     def pattern(self) -> re.Pattern[bytes]:
         """Return the frame as a pattern with one group per part."""
-        return re.compile(b"".join(b"(" + part.pattern() + b")" for part in self.parts))
+        return _grouped(self.parts)
 
     @property
     def voices(self) -> tuple[Code | Bit, ...]:

@@ -18,8 +18,6 @@ from dbbstation.instrument.damaged import Marks
 from dbbstation.system.ports import LINE_ERRORS, holders, mark_damaged
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from serial.tools.list_ports_common import ListPortInfo
 
     from dbbstation.instrument.bytelog import ByteLog
@@ -238,42 +236,22 @@ def _first_words(error: Exception) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
-@dataclass(frozen=True, slots=True)
-class Adapter:
-    """The identity of a USB adapter.
-
-    Attributes:
-        socket: USB socket, decisive only without serial number.
-    """
-
-    vendor: int
-    product: int
-    serial_number: str
-    socket: str
-
-
-def adapter_of(port: str) -> Adapter | None:
+def adapter_of(port: str) -> ListPortInfo | None:
     """Return the adapter of a port, or None if the port is not USB or has gone."""
-    return next((adapter for name, adapter in _adapters(list_ports.comports()) if name == port), None)
+    return next((one for one in _adapters() if one.device == port), None)
 
 
-def port_of(adapter: Adapter) -> str | None:
+def port_of(adapter: ListPortInfo) -> str | None:
     """Return the adapter's current port, or None.
 
     For an adapter without serial number, the socket alone decides.
     """
-    return next((name for name, other in _adapters(list_ports.comports()) if _same(adapter, other)), None)
+    return next((one.device for one in _adapters() if _identity(one) == _identity(adapter)), None)
 
 
-def _adapters(ports: Iterable[ListPortInfo]) -> list[tuple[str, Adapter]]:
-    return [
-        (port.device, Adapter(port.vid, port.pid, port.serial_number or "", port.location or ""))
-        for port in ports
-        if port.vid is not None and port.pid is not None
-    ]
+def _adapters() -> list[ListPortInfo]:
+    return [port for port in list_ports.comports() if None not in (port.vid, port.pid)]
 
 
-def _same(one: Adapter, other: Adapter) -> bool:
-    if (one.vendor, one.product, one.serial_number) != (other.vendor, other.product, other.serial_number):
-        return False
-    return bool(one.serial_number) or one.socket == other.socket
+def _identity(port: ListPortInfo) -> tuple[object, ...]:
+    return port.vid, port.pid, port.serial_number or port.location or "", bool(port.serial_number)

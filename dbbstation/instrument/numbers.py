@@ -6,7 +6,7 @@ import math
 import re
 import struct
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -120,9 +120,7 @@ class DecimalText(Number):
             raise ValueError("write each special code with as many characters as its field has")
         return self
 
-    @property
-    def binary(self) -> bool:
-        return False
+    binary: ClassVar[bool] = False
 
     def rounded(self, value: float) -> float:
         return round(value, self.decimals) + 0.0
@@ -265,9 +263,7 @@ class Ieee(Number):
     def width(self) -> int:
         return self.size
 
-    @property
-    def binary(self) -> bool:
-        return True
+    binary: ClassVar[bool] = True
 
     @property
     def _format(self) -> str:

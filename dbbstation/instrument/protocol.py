@@ -275,7 +275,7 @@ class Protocol(Schema):
     @property
     def terminator(self) -> bytes:
         """Return the line end of all frames that are not bare; may be empty."""
-        ends = {frame.terminator for frame in self.frames if not frame.bare}
+        ends = {frame.literal(-1) for frame in self.frames if not frame.bare}
         return ends.pop() if len(ends) == 1 else b""
 
     @property

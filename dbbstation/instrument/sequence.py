@@ -50,10 +50,6 @@ class SampleOrder(Generic[Held]):
         """Return whether the wire has a counter."""
         return self._modulus is not None
 
-    def left(self) -> list[Placed[Held]]:
-        """Return the held samples as rejected, at the end of reading."""
-        return self._rejected()
-
     def place(self, counter: int | None, sample: Held) -> list[Placed[Held]]:
         """Add the next sample and return the samples whose position is now known.
 
@@ -66,9 +62,9 @@ class SampleOrder(Generic[Held]):
             self._last = counter
             return [Placed(sample, 0)]
         if self._held and self._goes_on_from_before(counter):
-            return [*self._rejected(), *self._accepted([(counter, sample)])]
+            return [*self.left(), *self._accepted([(counter, sample)])]
         if self._held and not self._ahead(self._held[-1][0], counter):
-            rejected = self._rejected()
+            rejected = self.left()
             self._held = [(counter, sample)]
             return rejected
         self._held.append((counter, sample))
@@ -88,7 +84,7 @@ class SampleOrder(Generic[Held]):
             # Behind, and not counting on: damaged lines in a row.
             *damaged, newest = self._held
             self._held = damaged
-            rejected = self._rejected()
+            rejected = self.left()
             self._held = [newest]
             return rejected
         if followers >= RESTART_FOLLOWERS:
@@ -108,7 +104,8 @@ class SampleOrder(Generic[Held]):
         self._held = []
         return placed
 
-    def _rejected(self) -> list[Placed[Held]]:
+    def left(self) -> list[Placed[Held]]:
+        """Return the held samples as rejected, at the end of reading."""
         held, self._held = self._held, []
         return [Placed(sample, None, self._why(counter)) for counter, sample in held]
 

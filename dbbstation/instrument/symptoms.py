@@ -35,9 +35,7 @@ def looks_like(raw: bytes, other_than: Protocol) -> list[Protocol]:
 
 
 def _understood(protocol: Protocol, raw: bytes) -> float:
-    heard = (
-        Decoder(protocol, joining=True).feed(raw) if protocol.by_width else Decoder(protocol, joining=False).feed(raw)
-    )
+    heard = Decoder(protocol, joining=protocol.by_width).feed(raw)
     readings = [one for one in heard if isinstance(one, Piece) and one.reading.length_mm is not None]
     return sum(len(one.raw) for one in readings) / max(len(raw), 1)
 

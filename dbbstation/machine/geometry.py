@@ -1,4 +1,4 @@
-"""Joints, travel, screws and masses of a hexapod, its rotations, and the differences of two machines by their keys."""
+"""Joints, travel, screws and masses of a hexapod, its rotations, differences of two machines, and a check of joints."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field
-from pydantic_core import PydanticCustomError
 
 from dbbstation.computing.arrays import Floats
 from dbbstation.errors import ModelError
-from dbbstation.facts.quantities import LimitsDeg, LimitsMm, Mass, Quantity
+from dbbstation.facts.quantities import LimitsDeg, LimitsMm, Mass, Quantity, complaint
 from dbbstation.facts.record import AsArray, Record, Sha256Hex
 from dbbstation.text.written import listed
 
@@ -111,9 +110,7 @@ _UNIT_WITHIN = 0.01
 def _direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     length = math.hypot(*vector)
     if abs(length - 1.0) > _UNIT_WITHIN:
-        raise PydanticCustomError(
-            "direction", "a direction has the length 1, not {length}", {"length": f"{length:.3g}"}
-        )
+        raise complaint(f"a direction has the length 1, not {length:.3g}")
     return vector
 
 
@@ -360,11 +357,63 @@ def _between(key: str, one: object, other: object) -> Iterator[Difference]:
 def _said(value: object) -> str:
     if value is None:
         return NOT_GIVEN
-    if isinstance(value, tuple):
-        return str(list(value))
     if is_dataclass(value):
         inside = "; ".join(f"{field.name} {_said(getattr(value, field.name))}" for field in fields(value))
         return f"({inside})"
-    if isinstance(value, np.ndarray):
-        return str(value.tolist())
-    return str(value)
+    return str(np.asarray(value).tolist() if isinstance(value, tuple | np.ndarray) else value)
+
+
+REGULAR_MM = 0.05
+"""Sides of an equilateral design, written with one decimal, agree within this [mm]. Three joints of another design,
+half a metre apart, agree by chance once in (500 / 0.05)², a hundred million."""
+
+OFF_MM = 1.0
+"""Rounding cannot make sides differ by more [mm]."""
+
+
+def check_joints(machine: Machine) -> None:
+    """Refuse a machine if three of its joints are regular and the other three are not.
+
+    Machines with all joints regular, or all irregular, are accepted.
+
+    Raises:
+        ModelError: names the joint, or its triplet, and the deviation.
+    """
+    for key in ("base_joints_mm", "platform_joints_mm"):
+        joints = np.asarray(getattr(machine.hexapod, key))
+        for one, other in (((0, 2, 4), (1, 3, 5)), ((1, 3, 5), (0, 2, 4))):
+            sides = _sides_mm(joints[list(other)])
+            if np.ptp(_sides_mm(joints[list(one)])) <= REGULAR_MM and np.ptp(sides) > OFF_MM:
+                raise ModelError(
+                    f"{key}: {_which(joints, one, other)}, while those of struts "
+                    f"{', '.join(str(strut + 1) for strut in one)} are exactly regular",
+                    where=machine.name,
+                    remedy="correct the joint in the model file's `machine`, or calibrate again with the right machine file",
+                )
+
+
+def _which(joints: Floats, regular: tuple[int, ...], other: tuple[int, ...]) -> str:
+    centre = joints[list(regular)].mean(axis=0)
+    first, second = joints[regular[1]] - joints[regular[0]], joints[regular[2]] - joints[regular[0]]
+    axis = np.cross(first, second)
+    axis /= np.linalg.norm(axis)
+    for place, strut in enumerate(other):
+        after, before = other[(place + 1) % 3], other[(place + 2) % 3]
+        for turn in (1.0, -1.0):
+            expected = _turned(joints[before] - centre, axis, turn) + centre
+            again = _turned(joints[after] - centre, axis, -turn) + centre
+            if np.linalg.norm(expected - again) <= OFF_MM:
+                off_mm = float(np.linalg.norm(joints[strut] - expected))
+                return f"the joint of strut {strut + 1} is {off_mm:.1f} mm from where those of the other struts put it"
+    sides = ", ".join(f"{side:.1f}" for side in _sides_mm(joints[list(other)]))
+    return f"the joints of struts {', '.join(str(strut + 1) for strut in other)} are {sides} mm apart"
+
+
+def _sides_mm(triangle: Floats) -> Floats:
+    return np.linalg.norm(triangle - np.roll(triangle, 1, axis=0), axis=1)
+
+
+def _turned(vector: Floats, axis: Floats, turn: float) -> Floats:
+    angle = turn * 2.0 * np.pi / 3.0
+    along = axis * (axis @ vector)
+    return along + (vector - along) * np.cos(angle) + np.cross(axis, vector) * np.sin(angle)

@@ -72,25 +72,9 @@ def forward(hexapod: Hexapod, length_mm: Floats, near: Frames) -> Frames:
     found = Frames(np.empty((count, 3)), np.empty((count, 3, 3)))
     target = np.ascontiguousarray(length_mm)
     outcome = np.empty(count, dtype=np.int64)
-    base, platform = _joints(hexapod, count)
-
-    def block(start: int, stop: int) -> None:
-        kernels.forward(
-            start,
-            stop,
-            target,
-            base,
-            platform,
-            TOLERANCE_MM,
-            MOST_STEPS,
-            near.position_mm,
-            near.rotation,
-            found.position_mm,
-            found.rotation,
-            outcome,
-        )
-
-    in_blocks(block, count)
+    machine = (target, *_joints(hexapod, count), TOLERANCE_MM, MOST_STEPS)
+    frames = (near.position_mm, near.rotation, found.position_mm, found.rotation)
+    in_blocks(kernels.forward, count, *machine, *frames, outcome)
     failed = outcome != kernels.CONVERGED
     if failed.any():
         first = int(np.argmax(failed))
@@ -137,8 +121,7 @@ class Response:
     @property
     def per_tool_ball(self) -> Floats:
         """Return the sensitivity to tool tip and ball, platform axes, shape (n, 3) [unit/mm]."""
-        turned: Floats = np.einsum("nji,nj->ni", self.rotation, self.direction)
-        return turned
+        return np.einsum("nji,nj->ni", self.rotation, self.direction)
 
 
 @dataclass(frozen=True)
@@ -179,26 +162,9 @@ def bar_sensitivity(
     length, direction = np.empty(count), np.empty((count, 3))
     gain = np.empty((count, PARAMETERS))
     outcome = np.empty(count, dtype=np.int64)
-    base, platform = _joints(hexapod, count)
-    fixed_ball, tool_ball = _balls(fixed_ball_mm, count), _balls(tool, count)
-
-    def block(start: int, stop: int) -> None:
-        kernels.bar(
-            start,
-            stop,
-            frames.position_mm,
-            frames.rotation,
-            base,
-            platform,
-            fixed_ball,
-            tool_ball,
-            length,
-            direction,
-            gain,
-            outcome,
-        )
-
-    in_blocks(block, count)
+    balls = (_balls(fixed_ball_mm, count), _balls(tool, count))
+    machine = (frames.position_mm, frames.rotation, *_joints(hexapod, count))
+    in_blocks(kernels.bar, count, *machine, *balls, length, direction, gain, outcome)
     failed = outcome != kernels.CONVERGED
     if failed.any():
         _refuse(int(np.argmax(failed)), frames, hexapod, strut_lengths(hexapod, frames), singular=True)
@@ -208,7 +174,7 @@ def bar_sensitivity(
 def position_responses(hexapod: Hexapod, frames: Frames) -> tuple[Response, Response, Response]:
     """Return sensitivities of the tool tip's X, Y and Z at `frames`."""
     struts = inverse(hexapod, frames)
-    pose_per_strut = np.asarray(np.linalg.inv(strut_jacobian(struts)), dtype=np.float64)
+    pose_per_strut = np.linalg.inv(strut_jacobian(struts))
     count = len(frames)
 
     def response(axis: int) -> Response:

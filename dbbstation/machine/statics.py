@@ -62,8 +62,7 @@ def transverse_pull(struts: Struts, masses: StrutMasses) -> Floats:
     f = sum m_k s_k / L * g_across, g_across = g - u (u g). [GRAV eq 2] prints the opposite sign.
     """
     across = GRAVITY_M_S2 * (DOWN - struts.unit * (struts.unit @ DOWN)[:, :, None])
-    pull: Floats = (_first_moment_kg_mm(struts, masses) / struts.length_mm)[:, :, None] * across
-    return pull
+    return (_first_moment_kg_mm(struts, masses) / struts.length_mm)[:, :, None] * across
 
 
 def _first_moment_kg_mm(struts: Struts, masses: StrutMasses) -> Floats:
@@ -97,10 +96,7 @@ def strut_tensions(struts: Struts, load: Load) -> Floats:
     outcome = np.empty(count, dtype=np.int64)
     force, moment = np.ascontiguousarray(load.force_n), np.ascontiguousarray(load.moment_n_mm)
 
-    def block(start: int, stop: int) -> None:
-        kernels.adjoint(start, stop, struts.unit, struts.arm_mm, force, moment, tension, outcome)
-
-    in_blocks(block, count)
+    in_blocks(kernels.adjoint, count, struts.unit, struts.arm_mm, force, moment, tension, outcome)
     if (outcome != kernels.CONVERGED).any():
         raise KinematicsError(
             "the struts cannot hold the platform there (singular pose)",

@@ -61,7 +61,8 @@ def circle_toolpath(
         approach: where rapids end and the program waits for the bar; None: the bar stays on, and the program has only
             feed moves.
     """
-    first, last = circle.poses(_ends_deg(circle), circle.feed_in_mm)
+    ends_deg = circle.theta_deg(np.array([-circle.overshoot_deg, FULL_TURN_DEG + circle.overshoot_deg]))
+    first, last = circle.poses(ends_deg, circle.feed_in_mm)
     path = ToolpathBuilder(name)
     path.corner_mm = max(LEAST_CORNER_MM, chord_error_mm(circle, step_deg))
     path.holds = {IN_FORCE: (0.0,) * 6}
@@ -71,11 +72,12 @@ def circle_toolpath(
     if approach is not None:
         path.say(RowKind.PAUSE, BAR_ON)
     path.dwell(OUTER_DWELL_S)
-    arc = circle.poses(circle.theta_deg(arc_phi_deg(circle, step_deg)))
+    theta_deg = circle.theta_deg(arc_phi_deg(circle, step_deg))
+    arc = circle.poses(theta_deg)
     path.feed(arc[:1], circle.feed_mm_min)
     path.dwell(CORNER_DWELL_S)
     x, y, _ = circle.centre_mm
-    turned = np.diff(np.radians(circle.theta_deg(arc_phi_deg(circle, step_deg))))
+    turned = np.diff(np.radians(theta_deg))
     # One step each on the overshoot and on the turn.
     parts = np.flatnonzero(np.abs(np.diff(turned)) > EVEN_RAD) + 1
     for poses, angles in zip(np.split(arc[1:], parts), np.split(turned, parts), strict=True):
@@ -102,10 +104,6 @@ def arc_phi_deg(circle: Circle, step_deg: float) -> Floats:
 def chord_error_mm(circle: Circle, step_deg: float) -> float:
     """Return the distance of a chord's middle from the circle, r (1 - cos(step / 2)) [mm]."""
     return circle.radius_mm * float(1.0 - np.cos(np.radians(step_deg) / 2.0))
-
-
-def _ends_deg(circle: Circle) -> Floats:
-    return circle.theta_deg(np.array([-circle.overshoot_deg, FULL_TURN_DEG + circle.overshoot_deg]))
 
 
 def _raised(pose: Floats, by_mm: float) -> Floats:

@@ -14,7 +14,7 @@ from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.nc.planner import LOOKS_AHEAD, cuts
 from dbbstation.nc.splitting import (
     Pieces,
-    along,
+    looked_aside,
     looked_at,
     off_chord_mm,
     parts_of,
@@ -164,9 +164,7 @@ def _commanded(
         return pieces, at[:, -1], off_chord_mm(at, DENSELY)
     some = np.flatnonzero(np.isnan(off_mm))
     if len(some):
-        behind, places = curve.behind, along(curve.toolpath, Pieces(pieces.begin[some], pieces.end[some]), DENSELY[:-1])
-        inner = curve.at(places.reshape(-1)).reshape(*places.shape, 6)
-        curve.behind = behind
+        inner = looked_aside(curve, Pieces(pieces.begin[some], pieces.end[some]), DENSELY[:-1])
         at = np.concatenate([ends[some, :1], inner, ends[some, 1:]], axis=1)
         off_mm[some] = off_chord_mm(at, DENSELY)
     return pieces, ends[:, 1], off_mm

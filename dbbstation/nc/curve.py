@@ -141,8 +141,7 @@ def row_and_share(places: Floats) -> tuple[Integers, Floats]:
 
 def felt_mm(off: Floats) -> Floats:
     """Return the motion that pose differences, shape (k, 6), cause at the tip or the lever, shape (k,) [mm]: the larger one."""
-    felt: Floats = np.maximum(lengths(off[:, :3]), math.radians(LEVER_MM) * lengths(off[:, 3:]))
-    return felt
+    return np.maximum(lengths(off[:, :3]), math.radians(LEVER_MM) * lengths(off[:, 3:]))
 
 
 def rounding_mm(decimals: Sequence[int]) -> float:

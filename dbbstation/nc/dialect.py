@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from dbbstation.nc.setup import ControlSetup
     from dbbstation.nc.toolpath import Toolpath
 
+    Head = Callable[[], tuple[Sequence[str], tuple[int, ...]]]
+
 
 COMPENSATED = "compensated, greatest correction"
 """Text in the header of a compensated program."""
@@ -76,9 +78,7 @@ class Dialect(ABC):
         `toolpath.name` and `toolpath.run` identify the program, if a control needs a name or number.
         """
 
-    def write_parts(
-        self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]
-    ) -> LongText:
+    def write_parts(self, parts: Iterable[Toolpath], head: Head) -> LongText:
         """Return the program of a toolpath in parts; `head` returns header and `numbers` once all parts are made."""
         toolpath = joined(list(parts))
         header, numbers = head()

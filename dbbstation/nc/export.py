@@ -1,7 +1,8 @@
-"""Nominal and compensated programs as text, checked against the machine's travel."""
+"""Nominal and compensated programs as text, checked against the machine's travel, with remarks."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from itertools import chain, pairwise
 from typing import TYPE_CHECKING
@@ -10,21 +11,18 @@ import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import StationError
-from dbbstation.machine.geometry import check_model_is_of
-from dbbstation.machine.regularity import check_joints
+from dbbstation.machine.geometry import check_joints, check_model_is_of
 from dbbstation.model.identified import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import Compensation, Prefer, compensated_parts
 from dbbstation.nc.curve import felt_mm, rounding_mm
 from dbbstation.nc.dialect import COMPENSATED
 from dbbstation.nc.limits import CHORD_MM, CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
-from dbbstation.nc.mark import has_marks, marked, sums_of
-from dbbstation.nc.nominal import ProgramChecksum, check_machine, check_nominal
+from dbbstation.nc.mark import ProgramChecksum, check_machine, check_nominal, has_marks, marked, sums_of
 from dbbstation.nc.planner import Planner
 from dbbstation.nc.reach import STEP_DEG as REACH_DEG
 from dbbstation.nc.reach import STEP_MM as REACH_MM
 from dbbstation.nc.reach import check_feeds, check_reach
-from dbbstation.nc.remarks import check_kept, remarks_on
 from dbbstation.nc.setup import offset_text
 from dbbstation.nc.spilled import LongText, Spilled
 from dbbstation.nc.toolpath import in_pieces
@@ -130,11 +128,10 @@ def circle_programs(
     if unknown:
         known = ", ".join(plan.tests)
         raise StationError(f"the plan has no test {', '.join(unknown)}", where=plan.name, remedy=f"it has {known}")
-    runs = [(name, direction) for name in tests or plan.tests for direction in plan.tests[name].directions]
+    runs = plan.runs(tests)
     programs: list[Program] = []
-    for number, (name, direction) in enumerate(runs, 1):
+    for number, ((name, direction), circle) in enumerate(runs.items(), 1):
         progress(len(programs), len(runs))
-        circle = plan.tests[name].run(direction)
         title = f"test {name} {direction}"
 
         step = step_deg
@@ -159,11 +156,10 @@ def dry_run(
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> tuple[int, list[StationError]]:
     """Check the nominal programs of all runs of a plan without writing them."""
-    runs = [(name, direction) for name in tests or plan.tests for direction in plan.tests[name].directions]
+    runs = plan.runs(tests)
     faults: list[StationError] = []
-    for done, (name, direction) in enumerate(runs):
+    for done, ((name, direction), circle) in enumerate(runs.items()):
         progress(done, len(runs))
-        circle = plan.tests[name].run(direction)
         path = circle_toolpath(circle, f"test {name} {direction}", step_deg=step_deg, approach=approach)
         for check in (check_reach, check_feeds):
             try:
@@ -399,3 +395,67 @@ def _holds_for(path: Toolpath) -> list[str]:
 
 def _points(path: Toolpath) -> int:
     return int(np.count_nonzero(path.is_move))
+
+
+KEPT = 1.01
+"""Ratio of computed to programmed time at feed above which the loss is reported."""
+
+
+def remarks_on(
+    done: Compensation, asked_um: float, machine: Machine, dialect: Dialect, prefer: Prefer
+) -> tuple[str, ...]:
+    """Return a sentence each on an exceeded chord error, on time lost in short pieces, and on an uncorrected tilt."""
+    said = [*done.toolpath.notes]
+    if done.chord_um > asked_um:
+        said.append(
+            f"the path is kept within {up(done.chord_um)} µm, not within {asked_um:g} µm, at {done.toolpath.place(done.chord_line)}: the correction "
+            "has a step or bends more than the shortest pieces follow"
+        )
+    if dialect.look_ahead is None:
+        said.append(f"how far {dialect.name} looks ahead is not known: whether it keeps F was not checked")
+    elif done.seconds > KEPT * done.nominal_seconds:
+        said.append(
+            f"about {done.seconds:.0f} s at feed, {done.nominal_seconds:.0f} as written, with {said_acceleration(machine)}"
+        )
+    if prefer is Prefer.POSITION_ONLY:
+        said.append(
+            f"A, B and C are not corrected: a tilt is left that is felt as {up(done.tilt_um)} µm 100 mm from the tip"
+        )
+    return tuple(said)
+
+
+def check_kept(done: Compensation, asked_um: float, machine: Machine) -> None:
+    """Refuse a program that exceeds the chord error or loses a feed, stating values that keep both.
+
+    Raises:
+        StationError: names the worst line.
+    """
+    if done.chord_um > asked_um:
+        raise StationError(
+            f"the path is kept within {up(done.chord_um)} µm here, not within {asked_um:g} µm",
+            where=done.toolpath.place(done.chord_line),
+            remedy=f"--chord-um {up(done.chord_um)} is kept everywhere; without --strict the program is written as it is",
+        )
+    if math.isfinite(done.slowest_mm_min):
+        reached = math.floor(done.slowest_mm_min)
+        raise StationError(
+            f"the control reaches {f'F{reached}' if reached else 'no F'} here, with {said_acceleration(machine)}; the program takes about "
+            f"{done.seconds:.0f} s at feed, {done.nominal_seconds:.0f} as written",
+            where=done.toolpath.place(done.slowest_line),
+            remedy=(f"F{reached} is kept everywhere; " if reached else "")
+            + "without --strict the program is written as it is",
+        )
+
+
+def said_acceleration(machine: Machine) -> str:
+    """Return the acceleration and its origin as text."""
+    known = "of the machine file" if machine.acceleration_mm_s2 is not None else "assumed: the machine file has none"
+    return f"the acceleration of {machine.planned_acceleration_mm_s2 / 1e3:g} m/s² ({known})"
+
+
+def up(value: float) -> str:
+    """Return a number with two digits, rounded up."""
+    if value <= 0.0:
+        return "0"
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"{math.ceil(value / unit - 1e-9) * unit:.4g}"

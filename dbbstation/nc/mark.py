@@ -1,4 +1,4 @@
-"""The mark of a compensated program in the last decimals of its poses.
+"""The mark of a compensated program in the last decimals of its poses, its checksum, and their recognition.
 
 Each pose is moved by the last decimal of its angles, or of X, Y and Z if the angles are constant, until a hash of its
 six numbers begins with `BITS` zero bits. The mark survives edits of comments, line numbers and feeds, and added or
@@ -7,6 +7,8 @@ deleted lines. Fewer decimals or shifted poses destroy it.
 
 from __future__ import annotations
 
+import hashlib
+import re
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -14,8 +16,10 @@ import numpy as np
 from scipy.special import bdtrc
 
 from dbbstation.computing.compiled import compiled, inlined
+from dbbstation.errors import StationError
+from dbbstation.nc.dialect import already_compensated, plain, says_compensated
 from dbbstation.nc.spilled import Spilled
-from dbbstation.nc.toolpath import DECIMALS, in_last_decimals
+from dbbstation.nc.toolpath import DECIMALS, RowKind, in_last_decimals
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -23,9 +27,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
+    from dbbstation.machine.geometry import Machine
     from dbbstation.nc.toolpath import Toolpath
 
     _Blocks = Callable[[], Iterator[NDArray[np.uint64]]]
+
 
 BITS = {2: 16, 3: 11, 4: 7}
 """Number of zero bits of the hash, by the number of poses that can carry the mark; 4 means four and more. One pose in 2 to this power has the mark by chance. More bits move poses farther."""
@@ -86,9 +92,8 @@ def marked(
     # A pose that comes again counts once.
     bits = BITS[4 if follows or goes_on else min(max(len(np.unique(_sums(numbers[can]))), 2), 4)]
     steps = _steps(FARTHEST_ANGLE, 1) if bits == BITS[4] else _steps(FARTHEST_ANGLE_OF_FEW, FARTHEST_ANGLE_OF_FEW)
-    shifts = np.append(_SHIFTS, np.uint64(64 - bits))
     fixed, moved = _as_bits(~free[can]), _as_bits(steps != 0)
-    chosen = _first_marked(_sums(numbers[can]), fixed, _sums(steps), moved, _MIXING, shifts)
+    chosen = _first_marked(_sums(numbers[can]), fixed, _sums(steps), moved, np.uint64(64 - bits))
     numbers[can] += np.where(chosen[:, None] < 0, 0, steps[chosen])
     written = toolpath.numbers_written
     written[moves] = numbers / 10.0 ** np.array(decimals)
@@ -141,7 +146,7 @@ def has_marks(sums: _Blocks, most: int, count: int | None = None) -> bool:
 
 
 def _with_mark(sums: NDArray[np.uint64], bits: int) -> NDArray[np.uint64]:
-    return sums[_marks(sums, _MIXING, np.append(_SHIFTS, np.uint64(64 - bits)))]
+    return sums[_marks(sums, np.uint64(64 - bits))]
 
 
 def sums_of(toolpath: Toolpath, decimals: Sequence[int]) -> NDArray[np.uint64]:
@@ -186,8 +191,7 @@ def _off(numbers: Floats, decimals: int) -> float:
 
 
 def _as_bits(axes: Flags) -> Integers:
-    bits: Integers = axes @ (1 << np.arange(6))
-    return bits
+    return axes @ (1 << np.arange(6))
 
 
 @compiled
@@ -196,8 +200,7 @@ def _first_marked(
     fixed: Integers,
     step_sums: NDArray[np.uint64],
     moved: Integers,
-    mixing: NDArray[np.uint64],
-    shifts: NDArray[np.uint64],
+    unread: np.uint64,
 ) -> Integers:
     """Return the first step that marks each row without moving a fixed axis, -1 if none, shape (n,)."""
     chosen = np.full(len(sums), -1)
@@ -205,31 +208,30 @@ def _first_marked(
         for step in range(len(step_sums)):
             if moved[step] & fixed[row]:
                 continue
-            if _mixed(sums[row] + step_sums[step], mixing, shifts) >> shifts[3] == 0:
+            if _mixed(sums[row] + step_sums[step]) >> unread == 0:
                 chosen[row] = step
                 break
     return chosen
 
 
 def _sums(numbers: Integers, axes: slice = slice(None)) -> NDArray[np.uint64]:
-    weighted: NDArray[np.uint64] = numbers.astype(np.uint64) @ _ODD[axes]
-    return weighted
+    return numbers.astype(np.uint64) @ _ODD[axes]
 
 
 @compiled
-def _marks(sums: NDArray[np.uint64], mixing: NDArray[np.uint64], shifts: NDArray[np.uint64]) -> Flags:
+def _marks(sums: NDArray[np.uint64], unread: np.uint64) -> Flags:
     """Return whether the fourth shift leaves zero of each hash, shape (n,)."""
     found = np.zeros(len(sums), dtype=np.bool_)
     for row in range(len(sums)):
-        found[row] = _mixed(sums[row], mixing, shifts) >> shifts[3] == 0
+        found[row] = _mixed(sums[row]) >> unread == 0
     return found
 
 
 @inlined
-def _mixed(mixed: np.uint64, mixing: NDArray[np.uint64], shifts: NDArray[np.uint64]) -> np.uint64:
-    mixed = (mixed ^ (mixed >> shifts[0])) * mixing[0]
-    mixed = (mixed ^ (mixed >> shifts[1])) * mixing[1]
-    return mixed ^ (mixed >> shifts[2])
+def _mixed(mixed: np.uint64) -> np.uint64:
+    mixed = (mixed ^ (mixed >> _SHIFTS[0])) * _MIXING[0]
+    mixed = (mixed ^ (mixed >> _SHIFTS[1])) * _MIXING[1]
+    return mixed ^ (mixed >> _SHIFTS[2])
 
 
 def _free(toolpath: Toolpath, moves: Integers, decimals: Sequence[int]) -> Flags:
@@ -254,5 +256,88 @@ def _steps(angle: int, angle_and_place: int) -> Integers:
     both = np.stack(np.meshgrid(*[place] * 3, *[beside] * 3, indexing="ij"), axis=-1).reshape(-1, 6)
     turned = np.stack(np.meshgrid(*[[0]] * 3, *[alone] * 3, indexing="ij"), axis=-1).reshape(-1, 6)
     tried = np.unique(np.vstack([both, turned]), axis=0).astype(np.int64)
-    ordered: Integers = tried[np.argsort(np.linalg.norm(_FELT_NM * tried, axis=1), kind="stable")]
-    return ordered
+    return tried[np.argsort(np.linalg.norm(_FELT_NM * tried, axis=1), kind="stable")]
+
+
+CHECKSUMS = 99_999_999
+"""Line numbers have at most eight digits in LinuxCNC's language: one program in fifty million has its own checksum by chance."""
+
+_MACHINE = re.compile(r"machine\s*[:=]\s*(?P<name>.*\S)\s*", re.IGNORECASE)
+
+
+class ProgramChecksum:
+    """A checksum of moves, dwells and stops in order, with written decimals, over successive parts of a toolpath.
+
+    Comments, feeds, line numbers and units do not count.
+    """
+
+    def __init__(self, decimals: Sequence[int] = DECIMALS) -> None:
+        self._decimals = decimals
+        self._kinds, self._poses, self._dwells = hashlib.sha256(), hashlib.sha256(), hashlib.sha256()
+
+    def add(self, part: Toolpath) -> None:
+        """Count the next rows."""
+        told = np.isin(part.kind, [RowKind.RAPID, RowKind.FEED, RowKind.DWELL, RowKind.PAUSE])
+        counts = part.is_move & (part.unknown == 0)
+        poses = np.where(counts[:, None], in_last_decimals(part.numbers_written, self._decimals), 0)
+        self._kinds.update(part.kind[told].astype("<i1").tobytes())
+        self._poses.update(poses[told].astype("<i8").tobytes())
+        self._dwells.update("".join(f"{seconds:.6e} " for seconds in part.dwell_s[part.dwell_s != 0.0]).encode())
+
+    @property
+    def number(self) -> int:
+        """Return the checksum of all rows so far."""
+        digests = (each.digest() for each in (self._kinds, self._poses, self._dwells))
+        return 1 + int.from_bytes(hashlib.sha256(b"".join(digests)).digest()[:8]) % CHECKSUMS
+
+
+def checksum(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> int:
+    """Return the checksum of a toolpath."""
+    total = ProgramChecksum(decimals)
+    for part in toolpath.parts():
+        total.add(part)
+    return total.number
+
+
+def check_nominal(toolpath: Toolpath) -> None:
+    """Refuse a compensated program.
+
+    Three signs identify it: a comment, the mark in its poses, and the checksum as line number.
+
+    Raises:
+        StationError: it is compensated already.
+    """
+    how = "says its header" if says_compensated(toolpath) else ""
+    if (
+        not how
+        and toolpath.numbers
+        and any(checksum(toolpath, each) in toolpath.numbers for each in decimals_of(toolpath))
+    ):
+        how = "says the checksum in its line numbers"
+    if not how and is_marked(toolpath):
+        how = "say the last decimals of its poses"
+    if how:
+        raise already_compensated(toolpath.name, how)
+
+
+def check_machine(toolpath: Toolpath, machine: Machine) -> None:
+    """Refuse a program whose header names another machine.
+
+    Raises:
+        StationError: names both.
+    """
+    own = plain(f"machine: {machine.name}")
+    for text in _header(toolpath):
+        named = _MACHINE.fullmatch(text)
+        if named and plain(f"machine: {named['name']}") != own:
+            raise StationError(
+                f"its header names the machine {named['name']!r}, the model is of {machine.name!r}",
+                where=toolpath.name,
+                remedy="give the model of that machine, or post the program for this one",
+            )
+
+
+def _header(toolpath: Toolpath) -> Iterator[str]:
+    move = toolpath.first_move
+    first = len(toolpath) if move is None else move
+    return (text for row, text in toolpath.text.items() if row < first and toolpath.kind[row] == RowKind.COMMENT)

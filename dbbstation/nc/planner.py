@@ -53,8 +53,7 @@ class Planner:
         if self.look_ahead is None:
             return np.zeros_like(mm_s)
         least = mm_s**2 / (self.look_ahead.share * self.acceleration_mm_s2)
-        needed: Floats = least + CYCLES * self.look_ahead.cycle_s * mm_s
-        return needed
+        return least + CYCLES * self.look_ahead.cycle_s * mm_s
 
     def reached_mm_s(self, length_mm: Floats) -> Floats:
         """Return the speeds of turning pieces of these lengths, same shape [mm/s]."""
@@ -62,8 +61,7 @@ class Planner:
             return np.full_like(length_mm, np.inf)
         a = self.look_ahead.share * self.acceleration_mm_s2
         lost = CYCLES * self.look_ahead.cycle_s * a
-        reached: Floats = (np.sqrt(lost**2 + 4.0 * a * length_mm) - lost) / 2.0
-        return reached
+        return (np.sqrt(lost**2 + 4.0 * a * length_mm) - lost) / 2.0
 
     def row_mm_s(self, toolpath: Toolpath) -> Floats:
         """Return the speed of each row at feed that moves the tip, F or less, shape (n,) [mm/s]; infinite in other rows."""

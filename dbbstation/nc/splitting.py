@@ -89,8 +89,7 @@ def moves_of(toolpath: Toolpath) -> Integers:
     if number.any():
         same = (number[1:] == number[:-1]) & (number[1:] != 0)
         goes_on[1:] = same & (toolpath.line[1:] == toolpath.line[:-1]) & (toolpath.kind[1:] == toolpath.kind[:-1])
-    moves: Integers = np.cumsum(~goes_on) - 1
-    return moves
+    return np.cumsum(~goes_on) - 1
 
 
 def parts_of(toolpath: Toolpath, runs_in: Callable[[Toolpath], Integers]) -> Iterator[tuple[Toolpath, Integers]]:
@@ -137,8 +136,7 @@ def runs_of(toolpath: Toolpath, needed_mm: Floats) -> Integers:
     alike = (toolpath.feed[1:] == toolpath.feed[:-1]) & (toolpath.offset[1:] == toolpath.offset[:-1])
     joined = (short[1:] | short[:-1]) & cuts[1:] & cuts[:-1] & along & alike & ~(toolpath.corners_mm[:-1] <= 0.0)
     joined |= moves[1:] == moves[:-1]
-    runs: Integers = np.concatenate([[0], np.cumsum(~joined)])
-    return runs
+    return np.concatenate([[0], np.cumsum(~joined)])
 
 
 def split(
@@ -193,8 +191,7 @@ def off_chord_mm(at: Floats, shares: Floats) -> Floats:
     """Return the distance of the curve from each piece's chord, shape (k,) [mm]."""
     begin, end = at[:, 0], at[:, -1]
     off = [felt_mm(at[:, 1 + k] - (begin + share * (end - begin))) for k, share in enumerate(shares[:-1])]
-    worst: Floats = np.max(off, axis=0)
-    return worst
+    return np.max(off, axis=0)
 
 
 def looked_at(
@@ -224,13 +221,19 @@ def looked_at(
     return at
 
 
+def looked_aside(curve: CommandCurve, pieces: Pieces, shares: Floats) -> Floats:
+    """Return the commanded poses at shares of pieces, shape (n, k, 6), and let the curve go on from where it was."""
+    behind, places = curve.behind, along(curve.toolpath, pieces, shares)
+    at = curve.at(places.reshape(-1)).reshape(*places.shape, 6)
+    curve.behind = behind
+    return at
+
+
 def _halved(curve: CommandCurve, cells: Pieces, shares: Floats, at: Floats, halves: Flags) -> Floats:
     if curve.has_history:
         return looked_at(curve, cells, shares)
-    behind, places = curve.behind, along(curve.toolpath, Pieces(cells.begin[halves], cells.end[halves]), shares)
-    at[halves, 1:] = curve.at(places.reshape(-1)).reshape(*places.shape, 6)
+    at[halves, 1:] = looked_aside(curve, Pieces(cells.begin[halves], cells.end[halves]), shares)
     at[1:, 0] = at[:-1, -1]
-    curve.behind = behind
     return at
 
 

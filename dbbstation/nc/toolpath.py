@@ -526,8 +526,7 @@ def going_on(values: Floats, before: Floats) -> Floats:
     """Return modal values, shape (n, k): each NaN gets the value of the row above. `before`, shape (k,), is the row above the first."""
     known = np.vstack([before, values])
     at = np.where(np.isnan(known), 0, np.arange(len(known))[:, None])
-    filled: Floats = np.take_along_axis(known, np.maximum.accumulate(at, axis=0), axis=0)[1:]
-    return filled
+    return np.take_along_axis(known, np.maximum.accumulate(at, axis=0), axis=0)[1:]
 
 
 def bits_of(axes: Flags) -> int:

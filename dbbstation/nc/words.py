@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.computing.arrays import Flags, Integers
+    from dbbstation.nc.dialect import Head
     from dbbstation.nc.toolpath import Toolpath
 
 SIGNIFICANT_DIGITS = 7
@@ -93,15 +94,11 @@ class WordDialect(Dialect):
         """
         return str(self._written(toolpath.parts(), lambda: (header, toolpath.numbers)))
 
-    def write_parts(
-        self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]
-    ) -> LongText:
+    def write_parts(self, parts: Iterable[Toolpath], head: Head) -> LongText:
         """Return the program of a toolpath in parts, each written as soon as it is made."""
         return (self._written if type(self).write is WordDialect.write else super().write_parts)(parts, head)
 
-    def _written(
-        self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]
-    ) -> LongText:
+    def _written(self, parts: Iterable[Toolpath], head: Head) -> LongText:
         # The header, which is known last, comes first.
         text, first, state = LongText(), None, _Modal()
         for part in parts:
@@ -344,8 +341,7 @@ def _ends_of_plain(toolpath: Toolpath) -> list[int]:
     same = (kind[1:] == RowKind.FEED) & (kind[:-1] == RowKind.FEED) & (feed[1:] == feed[:-1])
     plain[1:-1] = same & ((corner[1:] == corner[:-1]) | np.isnan(corner[1:])) & ~toolpath.in_machine[1:]
     stops = np.flatnonzero(~plain)
-    ends: list[int] = stops[np.searchsorted(stops, np.arange(len(kind)))].tolist()
-    return ends
+    return stops[np.searchsorted(stops, np.arange(len(kind)))].tolist()
 
 
 class _Modal:

@@ -83,6 +83,11 @@ class Circle:
         """Return the arc between feed-in and feed-out [deg]."""
         return FULL_TURN_DEG + 2.0 * self.overshoot_deg
 
+    @property
+    def swept_s(self) -> float:
+        """Return the time on the circle, overshoots included [s]."""
+        return self.swept_deg / self.turning_deg_s
+
     def theta_deg(self, phi_deg: Floats) -> Floats:
         """Return the angle from +X towards +Y at progress `phi_deg`, 0 at the start [deg]."""
         return self.start_deg + self.direction.sign * phi_deg
@@ -109,13 +114,9 @@ class Circle:
         return np.vstack([outside[:1], arc, outside[1:]])
 
 
-_S_PER_MIN = 60.0
-
-
 def circle_s(circle: Circle) -> float:
     """Return the time of feed-in, turn, overshoots and feed-out, without dwells and ramps [s]."""
-    feeding_mm = 2.0 * circle.feed_in_mm
-    return circle.swept_deg / circle.turning_deg_s + feeding_mm / (circle.feed_mm_min / _S_PER_MIN)
+    return circle.swept_s + 2.0 * circle.feeding_s
 
 
 def circles_s(circles: Iterable[Circle]) -> float:
@@ -195,15 +196,19 @@ class Plan:
     repeat_at_end: tuple[str, ...] = ()
     largest_loss_percent: float = LARGEST_LOSS_PERCENT
 
+    def runs(self, tests: Iterable[str] = ()) -> dict[tuple[str, Direction], Circle]:
+        """Return the circle of every test, or of the named ones, in each of its directions."""
+        chosen = [self.tests[name] for name in tests or self.tests]
+        return {(test.name, direction): test.run(direction) for test in chosen for direction in test.directions}
+
     def check(self, machine: Machine) -> None:
         """Check every circle with feed-in and feed-out against the travel.
 
         Raises:
             TravelError: names test, direction, pose and limit.
         """
-        for test in self.tests.values():
-            for direction in test.directions:
-                check_travel(machine, test.run(direction).envelope(), where=f"test {test.name} {direction}")
+        for (name, direction), circle in self.runs().items():
+            check_travel(machine, circle.envelope(), where=f"test {name} {direction}")
 
 
 def chosen_of(plan: str, known: Iterable[str], tests: Sequence[str], exclude: Sequence[str]) -> list[str]:

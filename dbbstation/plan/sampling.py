@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.facts import of_facts
 from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:
@@ -76,8 +77,8 @@ def sampled_circles(plan: Plan, rate_hz: float) -> tuple[SampledCircle, ...]:
     found = []
     for name, test in plan.tests.items():
         seen, greatest = sampling(test.circle, rate_hz), enough_feed_mm_min(test.circle, rate_hz)
-        densest = (seen.points_per_turn, seen.spacing_deg, seen.highest_undulation, seen.enough, seen.is_circle)
-        found.append(SampledCircle(name, test.circle.feed_mm_min, rate_hz, *densest, greatest))
+        own = {"test": name, "readings_per_second": rate_hz, "greatest_feed_mm_min": greatest}
+        found.append(of_facts(SampledCircle, seen, test.circle, **own))
     return tuple(found)
 
 

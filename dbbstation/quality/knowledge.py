@@ -13,8 +13,7 @@ from dbbstation.circles.analysis import CircleAnalysis, analyse, feed_shown
 from dbbstation.computing.arrays import hypot_of, norm_of
 from dbbstation.errors import TraceError
 from dbbstation.inference.harmonics import SAMPLES_PER_HARMONIC, amplitudes
-from dbbstation.trace.cut import cut, edges_of, lost_on_turn, unusable_on_turn
-from dbbstation.trace.feeding import FeedingWay, feeding_ways
+from dbbstation.trace.cut import FeedingWay, cut, edges_of, feeding_ways, lost_on_turn, unusable_on_turn
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -260,7 +259,7 @@ def _ways(run: Run) -> tuple[FeedingWay, FeedingWay] | None:
 
 def due_s(circle: Circle) -> float:
     """Return the programmed time between the midpoints of feed-in and feed-out [s]."""
-    return circle.swept_deg / circle.turning_deg_s + circle.feeding_s
+    return circle.swept_s + circle.feeding_s
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from dbbstation.facts import of_facts, picked
 from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.files.atomic import streamed
 from dbbstation.files.provenance import Provenance
-from dbbstation.nc.remarks import said_acceleration
+from dbbstation.nc.export import said_acceleration
 from dbbstation.nc.spilled import LongText
 from dbbstation.results.frame import Framed
 

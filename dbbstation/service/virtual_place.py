@@ -12,8 +12,7 @@ from dbbstation.station import events
 from dbbstation.station.programs import read_toolpath
 from dbbstation.station.states import State
 from dbbstation.virtual.cell import VirtualCell
-from dbbstation.virtual.machine import VirtualMachine
-from dbbstation.virtual.path import path_of
+from dbbstation.virtual.machine import VirtualMachine, path_of
 from dbbstation.virtual.truth import random_kinematics
 from dbbstation.virtual.wire import VirtualInstrument
 from dbbstation.virtual.wire_clock import ScaledClock

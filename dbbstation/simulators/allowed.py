@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import logging
 from pathlib import Path
@@ -12,7 +11,7 @@ from dbbstation.catalogue import files_of_packages, looked_up
 from dbbstation.errors import OutputError, StationError
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.simulator import read_simulator
-from dbbstation.files.gateway import content_of
+from dbbstation.files.gateway import content_of, sha256_hex
 from dbbstation.files.keys import digests_of
 from dbbstation.files.places import real_path, shipped_folder
 from dbbstation.simulators.program import whole_command
@@ -78,7 +77,7 @@ def require_allowed(path: Path, settings: Collection[str], *, allow: bool) -> st
 def key_of_simulator(path: Path, file: SimulatorFile) -> str:
     """Return the SHA-256 of all files that define a simulator."""
     named = digests_of([path, *files_of_simulator(path, file)], path.parent)
-    return hashlib.sha256(json.dumps(sorted(named)).encode()).hexdigest()
+    return sha256_hex(json.dumps(sorted(named)))
 
 
 def files_of_simulator(path: Path, file: SimulatorFile) -> list[Path]:

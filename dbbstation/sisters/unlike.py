@@ -139,7 +139,7 @@ class _Departure:
     def beyond(self) -> Floats:
         """Return the probability of a larger difference by Student's t; NaN gives one half."""
         probability = stdtr(self.freedom, -np.abs(self.off) / self.spread)
-        return np.asarray(np.where(np.isfinite(probability), probability, 0.5))
+        return np.where(np.isfinite(probability), probability, 0.5)
 
 
 def _departure(values: Floats, variance: Floats, others: Flags, machine: Integers) -> _Departure:

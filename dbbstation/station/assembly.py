@@ -167,8 +167,7 @@ class Job:
             check_range(plan, self.range_mm, file=plan_file)
 
     def _check_room(self, plan: Plan) -> None:
-        circles = [test.run(direction) for test in plan.tests.values() for direction in test.directions]
-        needed = LEAST_FREE + BYTES_PER_READING * (self.rate_hz or 0.0) * circles_s(circles)
+        needed = LEAST_FREE + BYTES_PER_READING * (self.rate_hz or 0.0) * circles_s(plan.runs().values())
         free = free_bytes(self.folder)
         if free is not None and free < needed:
             what = f"the disk has {free / 1e6:.0f} MB free, the session needs {needed / 1e6:.0f} MB"

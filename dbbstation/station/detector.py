@@ -25,7 +25,7 @@ DWELL_BEHIND_S = 0.5
 
 def feed_out_due_s(circle: Circle) -> float:
     """Return the time between the edges of feed-in and feed-out at the plan's feed, plus the tolerance of cutting [s]."""
-    return (1.0 + FEED_TOLERANCE) * circle.swept_deg / circle.turning_deg_s + circle.feeding_s + 2.0 * CORNER_DWELL_S
+    return (1.0 + FEED_TOLERANCE) * circle.swept_s + circle.feeding_s + 2.0 * CORNER_DWELL_S
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Patience:
 
     def for_turn_s(self, circle: Circle) -> float:
         """Return the longest time between feed-in and feed-out [s]."""
-        return self.turn_factor * circle.swept_deg / circle.turning_deg_s + self.turn_extra_s
+        return self.turn_factor * circle.swept_s + self.turn_extra_s
 
 
 SETTLED_S = 2.0

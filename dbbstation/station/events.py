@@ -56,7 +56,12 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class StateChanged:
+class Event:
+    """Something that happened at the station."""
+
+
+@dataclass(frozen=True)
+class StateChanged(Event):
     """The sequencer is in another state."""
 
     state: State
@@ -64,7 +69,7 @@ class StateChanged:
 
 
 @dataclass(frozen=True)
-class OfTheRun:
+class OfTheRun(Event):
     """An event of a run."""
 
     run: RunId
@@ -90,7 +95,7 @@ class RunAnnounced(OfTheRun):
 
 
 @dataclass(frozen=True)
-class ReadingsSeen:
+class ReadingsSeen(Event):
     """Readings outside a run, in time order, for a live display."""
 
     samples: tuple[Sample, ...]
@@ -176,7 +181,7 @@ class FeedInMissed(OfTheRun):
 
 
 @dataclass(frozen=True)
-class Noted:
+class Noted(Event):
     """A note or a temperature was added."""
 
     text: str
@@ -210,14 +215,14 @@ class RunLate(OfTheRun):
 
 
 @dataclass(frozen=True)
-class CommandRefused:
+class CommandRefused(Event):
     """The present state does not allow a command; it had no effect."""
 
     why: str
 
 
 @dataclass(frozen=True)
-class SessionFinished:
+class SessionFinished(Event):
     """The sequence is finished."""
 
     accepted: int
@@ -225,7 +230,7 @@ class SessionFinished:
 
 
 @dataclass(frozen=True)
-class SessionStopped:
+class SessionStopped(Event):
     """The user ended the sequence.
 
     Attributes:
@@ -239,34 +244,12 @@ class SessionStopped:
 
 
 @dataclass(frozen=True)
-class Fault:
+class Fault(Event):
     """Instrument or storage failed and the sequence ends; recordings are kept."""
 
     error: StationError
     interrupted: RunId | None
 
-
-Event: TypeAlias = (
-    StateChanged
-    | RunAnnounced
-    | ReadingsSeen
-    | RunStarted
-    | SamplesRecorded
-    | FeedInSeen
-    | RunProgress
-    | RunCompleted
-    | RunDoubted
-    | RunRestored
-    | FeedInMissed
-    | Noted
-    | RunAccepted
-    | RunRejected
-    | RunLate
-    | CommandRefused
-    | SessionFinished
-    | SessionStopped
-    | Fault
-)
 
 Observer: TypeAlias = "Callable[[Event], None]"
 """Function that is called with each event in the sequence's thread. An exception in it ends the sequence."""

@@ -79,16 +79,12 @@ class RunJudge:
         """Note which runs are accepted."""
         if not isinstance(event, events.RunAccepted | events.RunRejected):
             return
-        key = _key(event.run)
-        if isinstance(event, events.RunAccepted):
-            for known in (self._waiting, self._rejected):
-                if key in known:
-                    self._counting[key] = known.pop(key)
-        else:
-            for known in (self._counting, self._waiting):
-                if key in known:
-                    # Kept: a verdict may be taken back.
-                    self._rejected[key] = known.pop(key)
+        # Rejected runs are kept: a verdict may be taken back.
+        accepted, key = isinstance(event, events.RunAccepted), _key(event.run)
+        into, other = (self._counting, self._rejected) if accepted else (self._rejected, self._counting)
+        for known in (self._waiting, other):
+            if key in known:
+                into[key] = known.pop(key)
 
     def known(self) -> tuple[JudgedRun, ...]:
         """Return figures and findings of judged runs from the disk."""

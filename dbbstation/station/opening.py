@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.session import ReadBy, SessionDetails
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.machine.geometry import Machine
-    from dbbstation.plan.plan import Direction
 
 
 def check_session(
@@ -138,14 +137,5 @@ def clock_watch(
 
 def last_end(session: SessionFolder) -> datetime | None:
     """Return the latest possible end of the last run, or None."""
-    ends = [
-        run.started + timedelta(seconds=2.0 * _turn_s(session, run.test, run.direction))
-        for run in session.runs
-        if run.started is not None
-    ]
-    return max(ends, default=None)
-
-
-def _turn_s(session: SessionFolder, test: str, direction: Direction) -> float:
-    circle = session.plan.tests[test].run(direction)
-    return circle.swept_deg / circle.turning_deg_s
+    started = [(run.started, session.circle(run).swept_s) for run in session.runs if run.started is not None]
+    return max((began + timedelta(seconds=2.0 * swept_s) for began, swept_s in started), default=None)

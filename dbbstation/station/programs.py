@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.errors import InputError, StationError, read_each
 from dbbstation.files.source_text import decode, read_bytes, without_faults
 from dbbstation.nc.commanded import poses_at_progress
-from dbbstation.nc.nominal import check_nominal
+from dbbstation.nc.mark import check_nominal
 from dbbstation.nc.reach import check_reach
 from dbbstation.nc.registry import dialect_of_file, known_dialects
 
@@ -46,11 +46,10 @@ def load_programs(folder: Path, plan: Plan, machine: Machine) -> dict[tuple[str,
     """
 
     def read(run: tuple[str, Direction]) -> RunProgram:
-        test, direction = run
-        return _loaded(_file_of(folder, f"{test}-{direction}"), plan.tests[test].run(direction), machine)
+        return _loaded(_file_of(folder, f"{run[0]}-{run[1]}"), circles[run], machine)
 
-    runs = [(name, direction) for name, test in plan.tests.items() for direction in test.directions]
-    return dict(zip(runs, read_each(read, runs), strict=True))
+    circles = plan.runs()
+    return dict(zip(circles, read_each(read, circles), strict=True))
 
 
 def read_toolpath(path: Path, content: bytes) -> Toolpath:
@@ -60,7 +59,7 @@ def read_toolpath(path: Path, content: bytes) -> Toolpath:
         InputError: faults with line and column.
         ModelError: no dialect has files with that extension.
     """
-    text = without_faults(lambda faults: decode(content, str(path), faults))
+    text = without_faults(decode, content, str(path))
     return dialect_of_file(path.name, text).read(text, str(path))
 
 
@@ -77,7 +76,7 @@ def _file_of(folder: Path, stem: str) -> Path:
 
 
 def _loaded(path: Path, circle: Circle, machine: Machine) -> RunProgram:
-    content = without_faults(lambda faults: read_bytes(path, faults))
+    content = without_faults(read_bytes, path)
     try:
         toolpath = read_toolpath(path, content)
         poses_at_progress(toolpath, circle, _PHI_DEG)

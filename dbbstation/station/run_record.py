@@ -62,9 +62,6 @@ class RunRecord:
     _last_s: float = 0.0
     _last_mm: float | None = None
 
-    def __len__(self) -> int:
-        return self.samples
-
     def add(self, reading: Reading) -> Sample:
         """Add a reading.
 
@@ -124,10 +121,6 @@ class RunRecord:
     def left(self, t_s: float) -> bool:
         """Return whether enough time has passed since the feed-out."""
         return self.fed_out_s is not None and t_s >= self.fed_out_s + self.circle.feeding_s / 2.0 + DWELL_BEHIND_S
-
-    def circle_figures(self, recording: Recording, largest_loss_percent: float) -> tuple[CircleFigures | None, str]:
-        """Return the circle's figures, or None and the reason."""
-        return circle_figures(recording, self.circle, self.lost, self.lost_on_turn, largest_loss_percent)
 
 
 def circle_figures(

@@ -67,7 +67,7 @@ class Schedule:
                 self._accepted[run.test, run.direction, run.repeat] = run.state is RunState.ACCEPTED
         if recorded:
             # Where the last run was measured: what was left out before that comes at the end.
-            self._place = self._place_of(recorded[-1].test, recorded[-1].direction)
+            self._place = self._place_of(recorded[-1])
 
     @property
     def accepted(self) -> int:
@@ -82,23 +82,20 @@ class Schedule:
 
     def to_come(self, run: RunId) -> int:
         """Return the number of tasks without an accepted run, apart from this run's task."""
-        mine = self.tasks[self._place_of(run.test, run.direction)]
+        mine = self.tasks[self._place_of(run)]
         return sum(task != mine for task in self.open)
 
     def counts_beside(self, run: RunId) -> RunId | None:
         """Return another accepted run of the same task, which would also count, or None."""
         if any((task.test, task.direction) == (run.test, run.direction) for task in self.open):
             return None
-        mine = [
-            (t, d, r)
-            for (t, d, r), accepted in self._accepted.items()
-            if accepted and (t, d) == (run.test, run.direction)
-        ]
+        of_run = run.test, run.direction
+        mine = [key for key, accepted in self._accepted.items() if accepted and key[:2] == of_run]
         return RunId(*mine[-1], 0) if mine and mine[-1][2] != run.repeat else None
 
     def number_of(self, run: RunId) -> int:
         """Return a run's task number, from 1."""
-        return self._place_of(run.test, run.direction) + 1
+        return self._place_of(run) + 1
 
     def next(self) -> NextRun | None:
         """Return the run of the next open task that was not skipped, or None."""
@@ -121,7 +118,7 @@ class Schedule:
 
     def accept(self, run: RunId) -> None:
         """Note an accepted run and continue after it."""
-        place = self._place_of(run.test, run.direction)
+        place = self._place_of(run)
         self._accepted[run.test, run.direction, run.repeat] = True
         self._place, self._again = place, None
 
@@ -141,7 +138,7 @@ class Schedule:
 
     def pass_over(self, run: RunId) -> None:
         """Skip a run's task."""
-        self._place, self._again = self._place_of(run.test, run.direction), None
+        self._place, self._again = self._place_of(run), None
         self._passed.add(self.tasks[self._place])
 
     def go_to(self, test: str, direction: Direction | None = None) -> None:
@@ -165,8 +162,8 @@ class Schedule:
         following = [k for k in left if k >= self._place] or left
         return self.tasks[following[0]] if following else None
 
-    def _place_of(self, test: str, direction: Direction) -> int:
-        mine = [k for k, task in enumerate(self.tasks) if (task.test, task.direction) == (test, direction)]
+    def _place_of(self, run: RunId | RunEntry) -> int:
+        mine = [k for k, task in enumerate(self.tasks) if (task.test, task.direction) == (run.test, run.direction)]
         still = [k for k in mine if self.tasks[k] in self.open]
         return next((k for k in still if self.tasks[k] not in self._passed), (still or mine)[-1])
 

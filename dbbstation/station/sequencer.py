@@ -27,7 +27,7 @@ from dbbstation.station.commands import (
     Start,
 )
 from dbbstation.station.detector import CircleWatch, EdgeDetector, Patience
-from dbbstation.station.run_record import RunRecord, unrecorded
+from dbbstation.station.run_record import RunRecord, circle_figures, unrecorded
 from dbbstation.station.states import (
     COMMAND_CAUSES,
     FINAL,
@@ -464,12 +464,13 @@ class Sequencer:
         findings: tuple[Finding, ...] = ()
         if not problem:
             recording = self._recorded(record.run, self._untold(record.run))
-            found, problem = record.circle_figures(recording, self.plan.largest_loss_percent)
+            lost, most_percent = (record.lost, record.lost_on_turn), self.plan.largest_loss_percent
+            found, problem = circle_figures(recording, record.circle, *lost, most_percent)
             if found is not None and self._judge_run is not None:
                 findings = self._judge_run(record.run, recording)
         completed = events.RunCompleted(
             record.run,
-            len(record),
+            record.samples,
             record.lost,
             found,
             problem,

@@ -4,22 +4,9 @@ from __future__ import annotations
 
 from enum import StrEnum
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
-from dbbstation.station.commands import (
-    Accept,
-    AddNote,
-    Command,
-    GoTo,
-    Judge,
-    Pause,
-    Quit,
-    Reject,
-    Repeat,
-    Resume,
-    Skip,
-    Start,
-)
+from dbbstation.station.commands import Command
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -123,21 +110,7 @@ VERDICT = frozenset({State.COMPLETE, State.FLAWED})
 FINAL = frozenset(state for state, ways in TRANSITIONS.items() if not ways)
 """States that cannot be left."""
 
-COMMAND_CAUSES: Mapping[type[Command], Trigger] = MappingProxyType(
-    {
-        Start: Trigger.START,
-        Accept: Trigger.ACCEPT,
-        Repeat: Trigger.REPEAT,
-        Reject: Trigger.REJECT,
-        Skip: Trigger.SKIP,
-        Quit: Trigger.QUIT,
-        GoTo: Trigger.GO_TO,
-        Judge: Trigger.JUDGE,
-        AddNote: Trigger.NOTE,
-        Pause: Trigger.PAUSE,
-        Resume: Trigger.RESUME,
-    }
-)
+COMMAND_CAUSES: Mapping[type[Command], Trigger] = dict(zip(get_args(Command), Trigger, strict=False))
 """The trigger of each command."""
 
 

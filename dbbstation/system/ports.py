@@ -28,17 +28,15 @@ def holders(port: str, proc: Path = _PROC) -> list[str]:
 
 
 def _entries(folder: Path) -> list[Path]:
-    try:
+    with suppress(OSError):  # it has ended, or belongs to somebody else
         return list(folder.iterdir())
-    except OSError:  # it has ended, or belongs to somebody else
-        return []
+    return []
 
 
 def _leads_to(link: Path, target: str) -> bool:
-    try:
+    with suppress(OSError):
         return str(link.readlink()) == target
-    except OSError:
-        return False
+    return False
 
 
 def _name(process: Path) -> str:
@@ -101,19 +99,9 @@ def is_virtual(port: str) -> bool:
         process = int(_mark(port).read_text(encoding="ascii"))
     except (OSError, ValueError):
         return False
-    return _runs(process)
+    import psutil  # noqa: PLC0415 - few commands ask
 
-
-def _runs(process: int) -> bool:
-    if os.name != "posix":  # there a signal would end it
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
+    return psutil.pid_exists(process)
 
 
 def _mark(port: str) -> Path:

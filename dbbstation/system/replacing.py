@@ -30,16 +30,7 @@ def replace(path: Path, target: Path) -> None:
     Raises:
         OSError: the system refuses; both files are as before.
     """
-
-    def once() -> None:
-        try:
-            path.replace(target)
-        except PermissionError as error:
-            if not _made_writable(target, error):
-                raise
-            path.replace(target)
-
-    _patiently(once)
+    _patiently(lambda: path.replace(target), target)
 
 
 def rename(path: Path, target: Path) -> None:
@@ -57,16 +48,7 @@ def remove(path: Path) -> None:
     Raises:
         OSError: the system refuses.
     """
-
-    def once() -> None:
-        try:
-            path.unlink(missing_ok=True)
-        except PermissionError as error:
-            if not _made_writable(path, error):
-                raise
-            path.unlink(missing_ok=True)
-
-    _patiently(once)
+    _patiently(lambda: path.unlink(missing_ok=True), path)
 
 
 def remove_tree(folder: Path) -> None:
@@ -97,12 +79,14 @@ def _made_writable(path: Path, error: OSError) -> bool:
     return True
 
 
-def _patiently(act: Callable[[], object]) -> None:
+def _patiently(act: Callable[[], object], written: Path | None = None) -> None:
     until_s = time.monotonic() + PATIENCE_S
     while True:
         try:
             act()
         except PermissionError as error:
+            if written is not None and _made_writable(written, error):
+                continue
             if getattr(error, "winerror", None) not in _HELD or time.monotonic() > until_s:
                 raise
             time.sleep(_PAUSE_S)

@@ -89,11 +89,6 @@ def started() -> None:
 _SAFE, _OURS = "PYTHONSAFEPATH", "dbbstation"
 
 
-def end_as_hung_up() -> None:
-    """End this program as if its terminal had closed."""
-    os.kill(os.getpid(), CLOSED[0] if CLOSED else KILLED_POLITELY)
-
-
 _LOOK_MS = 500
 _PATIENCE_S = 10.0
 """Time for the screen to end by itself [s]; it may hang while it writes to a terminal that is gone."""
@@ -132,7 +127,7 @@ def _watch(terminal: int, over: threading.Event, last: Callable[[], None]) -> No
     nowhere = open_nothing()
     for stream in (0, 1, 2):
         os.dup2(nowhere, stream)
-    end_as_hung_up()
+    os.kill(os.getpid(), CLOSED[0] if CLOSED else KILLED_POLITELY)
     if not over.wait(_PATIENCE_S):
         last()
         os._exit(_FAILED)

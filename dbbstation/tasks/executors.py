@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from concurrent.futures import BrokenExecutor, CancelledError, as_completed
+from concurrent.futures import BrokenExecutor, CancelledError, as_completed, wait
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from dbbstation.computing.processes import processes
-from dbbstation.computing.threads import Background
+from dbbstation.computing.threads import in_background
 from dbbstation.errors import StationError
 from dbbstation.files.keys import differences_of, program_identity
 from dbbstation.system.signals import starting
@@ -125,11 +125,11 @@ def _of_dask(address: str) -> Iterator[Executor]:
 
 def _within(limit_s: float, act: Callable[[], Any]) -> Any:  # noqa: ANN401 - what it returns
     """Return a function's result within a time limit; Dask's own limit does not cover a connected, but silent server."""
-    work = Background(act)
-    work.wait(limit_s)
-    if not work.done:
+    work = in_background(act)
+    wait([work], limit_s)
+    if not work.done():
         raise TimeoutError(f"nothing within {limit_s:g} s")
-    return work.outcome()
+    return work.result()
 
 
 def _check_workers(client: Any, address: str) -> None:  # noqa: ANN401 - distributed ships no types

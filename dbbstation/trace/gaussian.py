@@ -49,4 +49,4 @@ def gaussian(theta_deg: Floats, values: Floats, cut_off_upr: float) -> Floats:
         return np.fft.irfft(np.fft.rfft(on_cells) * passed, cells)
 
     smooth = spread(values * arc) / spread(arc)
-    return np.asarray((1.0 - share) * smooth[lower] + share * smooth[upper], dtype=np.float64)
+    return (1.0 - share) * smooth[lower] + share * smooth[upper]

@@ -110,10 +110,10 @@ def _best_centre(points_mm: Floats) -> Floats:
     at_least = _widths(centres, outermost)
     likely = int(np.argmin(at_least))
     centres = centres[at_least <= _widths(centres[likely : likely + 1], points_mm)[0]]
-    return np.asarray(centres[np.argmin(_widths(centres, points_mm))])
+    return centres[np.argmin(_widths(centres, points_mm))]
 
 
 def _widths(centres_mm: Floats, points_mm: Floats) -> Floats:
     # Points are the first axis, so NumPy computes ranges over long rows of centres.
     across, along = (points_mm[:, k, None] - centres_mm[:, k] for k in (0, 1))
-    return np.asarray(np.ptp(np.sqrt(across * across + along * along), axis=0))
+    return np.ptp(np.sqrt(across * across + along * along), axis=0)

@@ -212,7 +212,7 @@ def logged_curve(
     from scipy.optimize import lsq_linear  # noqa: PLC0415 - takes a fifth of a second; few sessions need it
 
     found = lsq_linear(bending * half_step, -bending @ shown, bounds=(-1.0, 1.0))
-    return time_s, shown + half_step * np.asarray(found.x, dtype=np.float64)
+    return time_s, shown + half_step * found.x
 
 
 _BENDS = 3

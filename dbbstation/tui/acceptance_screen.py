@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from textual.content import Content
 
-from dbbstation.computing.threads import Background
+from dbbstation.computing.threads import in_background
 from dbbstation.errors import StationError
 from dbbstation.facts.serialise import as_objects
 from dbbstation.quality.conformity import Conformity
@@ -20,6 +20,7 @@ from dbbstation.tui.sentences import duration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from concurrent.futures import Future
     from pathlib import Path
 
     from textual.binding import BindingType
@@ -120,19 +121,19 @@ class AcceptanceScreen(RowScreen):
     def __init__(self, after: After, search: Callable[[Path], BeforeAndNow] = before_and_now) -> None:
         super().__init__()
         self._after, self._search = after, search
-        self._searching: Background[BeforeAndNow] | None = None
+        self._searching: Future[BeforeAndNow] | None = None
         self._found: BeforeAndNow | None = None
         self._failure = ""
 
     def on_mount(self) -> None:
-        self._searching = Background(lambda: self._search(self._after.session))
+        self._searching = in_background(lambda: self._search(self._after.session))
         self._draw()
 
     def look(self) -> None:
-        if self._searching is not None and self._searching.done:
+        if self._searching is not None and self._searching.done():
             searching, self._searching = self._searching, None
             try:
-                self._found = searching.outcome()
+                self._found = searching.result()
             except (StationError, OSError) as error:
                 self._failure = str(error)
         self._after.look()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from concurrent.futures import Future, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -11,7 +12,7 @@ from textual.binding import Binding
 from textual.events import InputEvent, Paste
 from textual.screen import ModalScreen
 
-from dbbstation.computing.threads import Background
+from dbbstation.computing.threads import in_background
 from dbbstation.errors import StationError
 from dbbstation.service.after import After
 from dbbstation.service.board import Board, Message, Weight
@@ -112,7 +113,7 @@ class StationApp(App[None]):
         self._operated = operated
         self._answering = False
         self._leaving = self._opening = self._wholly = False
-        self._works: list[tuple[Background[Any], Callable[[Any], None], Callable[[Exception], None]]] = []
+        self._works: list[tuple[Future[Any], Callable[[Any], None], Callable[[Exception], None]]] = []
         self._after: dict[Path, After] = {}
         self._looked_up: tuple[Path, str] | None = None
 
@@ -140,8 +141,7 @@ class StationApp(App[None]):
             self._runner.close()
         for after in self._after.values():
             after.close()
-        for work, _, _ in self._works:
-            work.wait()
+        wait([work for work, _, _ in self._works])
         if self._front is not None:
             self._front.close()
 
@@ -209,18 +209,18 @@ class StationApp(App[None]):
         self.do(lambda: last_traces(folder, test), found, lambda _error: None)
 
     def _finish_works(self) -> None:
-        done = [one for one in self._works if one[0].done]
-        self._works = [one for one in self._works if not one[0].done]
+        done = [one for one in self._works if one[0].done()]
+        self._works = [one for one in self._works if not one[0].done()]
         for work, then, failed in done:
             try:
-                outcome = work.outcome()
+                outcome = work.result()
             except (StationError, OSError, ValueError) as error:
                 failed(error)
             else:
                 then(outcome)
 
     def do(self, work: Callable[[], Any], then: Callable[[Any], None], failed: Callable[[Exception], None]) -> None:
-        self._works.append((Background(work), then, failed))
+        self._works.append((in_background(work), then, failed))
 
     def open(self, choice: Choice, prepared: Prepared, failed: Callable[[Exception], None]) -> None:
         """Open a job in the background and show its screen. Only one job can be open."""

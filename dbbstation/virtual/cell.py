@@ -12,8 +12,7 @@ from dbbstation.virtual.wire_clock import WaitingClock
 
 if TYPE_CHECKING:
     from dbbstation.plan.plan import Direction
-    from dbbstation.virtual.machine import VirtualMachine, VirtualRun
-    from dbbstation.virtual.path import CommandedPath
+    from dbbstation.virtual.machine import CommandedPath, VirtualMachine, VirtualRun
     from dbbstation.virtual.wire_clock import ScaledClock
 
 

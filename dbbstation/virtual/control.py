@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-import selectors
 import socket
 import threading
+from contextlib import suppress
+from socketserver import StreamRequestHandler, ThreadingTCPServer
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from typing import Self
 
     from dbbstation.virtual.cell import VirtualCell
-    from dbbstation.virtual.path import CommandedPath
+    from dbbstation.virtual.machine import CommandedPath
 
     Programs = Callable[[str], CommandedPath]
 
@@ -73,71 +74,54 @@ class CellCommands:
         return self._programs(program[0])
 
 
-class ControlServer:
-    """Answers on a loopback port in one thread; a `with` block."""
+class _Line(StreamRequestHandler):
+    """Answers the commands of one client."""
+
+    server: ControlServer
+
+    def handle(self) -> None:
+        """Answer until the client closes, or sends a line that does not end."""
+        with suppress(OSError):
+            while (line := self.rfile.readline(_LONGEST)).endswith(b"\n"):
+                self.wfile.write(self.server.answer(line))
+
+
+class ControlServer(ThreadingTCPServer):
+    """Answers on a loopback port, one command at a time; a `with` block."""
 
     def __init__(self, obey: Callable[[str], dict[str, object]]) -> None:
-        self._obey = obey
-        self._server = socket.create_server((LOOPBACK, 0))
-        self._server.setblocking(False)  # noqa: FBT003 (the socket module's own signature)
-        self.url = f"{SCHEME}{LOOPBACK}:{self._server.getsockname()[1]}"
-        self._stop = threading.Event()
-        self._selector = selectors.DefaultSelector()
-        self._pending: dict[socket.socket, bytes] = {}
-        self._thread = threading.Thread(target=self._serve, name="control", daemon=True)
+        super().__init__((LOOPBACK, 0), _Line)
+        self._obey, self._one_at_a_time = obey, threading.Lock()
+        self._clients: list[socket.socket] = []
+        self.url = f"{SCHEME}{LOOPBACK}:{self.server_address[1]}"
+        self._thread = threading.Thread(target=self.serve_forever, args=(_TICK_S,), name="control", daemon=True)
 
     def __enter__(self) -> Self:
-        self._selector.register(self._server, selectors.EVENT_READ)
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stop.set()
+        self.shutdown()
         self._thread.join()
-        for client in list(self._pending):
-            self._forget(client)
-        self._selector.close()
-        self._server.close()
+        for client in self._clients:
+            with suppress(OSError):  # it has gone
+                client.shutdown(socket.SHUT_RDWR)
+        self.server_close()
 
-    def _serve(self) -> None:
-        while not self._stop.is_set():
-            for key, _ in self._selector.select(_TICK_S):
-                if key.fileobj is self._server:
-                    client, _address = self._server.accept()
-                    client.settimeout(1.0)
-                    self._pending[client] = b""
-                    self._selector.register(client, selectors.EVENT_READ)
-                elif isinstance(key.fileobj, socket.socket):
-                    self._hear(key.fileobj)
+    def get_request(self) -> tuple[socket.socket, object]:
+        """Accept a client, and keep it to be closed."""
+        client, address = super().get_request()
+        self._clients = [one for one in self._clients if one.fileno() >= 0] + [client]
+        return client, address
 
-    def _hear(self, client: socket.socket) -> None:
+    def answer(self, line: bytes) -> bytes:
+        """Return the answer to one command, a line of JSON."""
         try:
-            came = client.recv(_LONGEST)
-        except OSError:
-            came = b""
-        pending = self._pending[client] + came
-        if not came or len(pending) > _LONGEST:
-            self._forget(client)
-            return
-        *lines, self._pending[client] = pending.split(b"\n")
-        for line in lines:
-            answer = json.dumps(self._answer(line.decode("utf-8", "replace").strip())) + "\n"
-            try:
-                client.sendall(answer.encode())
-            except OSError:
-                self._forget(client)
-                return
-
-    def _answer(self, line: str) -> dict[str, object]:
-        try:
-            return {"ok": True, **self._obey(line)}
+            with self._one_at_a_time:
+                found = {"ok": True, **self._obey(line.decode("utf-8", "replace").strip())}
         except StationError as error:
-            return {"ok": False, "error": str(error)}
-
-    def _forget(self, client: socket.socket) -> None:
-        self._selector.unregister(client)
-        del self._pending[client]
-        client.close()
+            found = {"ok": False, "error": str(error)}
+        return json.dumps(found).encode() + b"\n"
 
 
 _PATIENCE_S = 30.0
@@ -178,15 +162,9 @@ class ControlClient:
             MachineError: no answer, or a refusal.
         """
         try:
-            with socket.create_connection(self._address, timeout=_PATIENCE_S) as line:
+            with socket.create_connection(self._address, timeout=_PATIENCE_S) as line, line.makefile("rb") as answers:
                 line.sendall((" ".join(words) + "\n").encode())
-                came = b""
-                while not came.endswith(b"\n"):
-                    chunk = line.recv(65536)
-                    if not chunk:
-                        break
-                    came += chunk
-            answer: dict[str, object] = json.loads(came)
+                answer: dict[str, object] = json.loads(answers.readline())
         except (OSError, ValueError) as error:
             raise MachineError(
                 f"the virtual machine does not answer `{' '.join(words)}`: {error}",

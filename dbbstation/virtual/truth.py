@@ -98,35 +98,31 @@ class MeasurementErrors:
     seed: int
     bar_uncertainty_mm: float
     set_up_mm: float = SET_UP_MM
-    _of_balls: dict[str, Fitted] = field(default_factory=dict)
-    _of_mountings: dict[int, Fitted] = field(default_factory=dict)
+    _fitted: dict[tuple[int, ...], Fitted] = field(default_factory=dict)
 
     def bar(self, shared: str) -> Fitted:
         """Return the length error of the bar."""
-        rng = np.random.default_rng([self.seed, 2])
-        (source,) = sources_named(("bar-offset",))
-        return Fitted(source, rng.normal(0.0, self.bar_uncertainty_mm, 1), shared)
+        return self._drawn((2,), "bar-offset", self.bar_uncertainty_mm, shared, 1)
 
     def ball(self, ball: Ball, shared: str) -> Fitted:
         """Return a ball's coordinate error, common to its mountings."""
-        if ball.name not in self._of_balls:
-            rng = np.random.default_rng([self.seed, 3, *ball.name.encode()])
-            (source,) = sources_named(("ball-coordinate",))
-            self._of_balls[ball.name] = Fitted(source, rng.normal(0.0, ball.uncertainty_mm, 3), shared)
-        return self._of_balls[ball.name]
+        return self._drawn((3, *ball.name.encode()), "ball-coordinate", ball.uncertainty_mm, shared)
 
     def mounting(self, ball: Ball, number: int, shared: str) -> Fitted:
         """Return a ball's position in its `number`-th mounting."""
-        if number not in self._of_mountings:
-            rng = np.random.default_rng([self.seed, 4, number])
-            (source,) = sources_named(("mounting",))
-            self._of_mountings[number] = Fitted(source, rng.normal(0.0, ball.repeatability_mm, 3), shared)
-        return self._of_mountings[number]
+        return self._drawn((4, number), "mounting", ball.repeatability_mm, shared)
+
+    def _drawn(self, key: tuple[int, ...], cause: str, size_mm: float, shared: str, count: int = 3) -> Fitted:
+        if key not in self._fitted:
+            (source,) = sources_named((cause,))
+            drawn = np.random.default_rng([self.seed, *key]).normal(0.0, size_mm, count)
+            self._fitted[key] = Fitted(source, drawn, shared)
+        return self._fitted[key]
 
     def set_up(self, number: int) -> SetUp:
         """Return the balls' positions at the tip in the `number`-th mounting under the spindle."""
         return SetUp.drawn(np.random.default_rng([self.seed, 6, number]), self.set_up_mm)
 
     def all(self) -> tuple[Fitted, ...]:
-        """Return all drawn errors of balls and mountings."""
-        return (*self._of_balls.values(), *self._of_mountings.values())
+        """Return all drawn errors: of the bar, of balls and of mountings."""
+        return tuple(self._fitted[key] for key in sorted(self._fitted, key=lambda key: key[0]))

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from dbbstation.files.formats.model import read_model
-from dbbstation.files.inputs import input_book, virtual_so_far
+from dbbstation.files.inputs import input_book, open_book
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.provenance import Provenance
 from dbbstation.files.recordings.former import former_sessions
@@ -39,8 +39,8 @@ def test_what_comes_from_a_virtual_session_says_so(tmp_path: Path) -> None:
     model.write_text(yaml.safe_dump(data), "utf-8")
     with input_book():
         read_model(model)
-        assert virtual_so_far() == ("model.yaml",)
-        comments = Provenance("p", "c", {}, virtual_so_far()).comments({})
+        assert tuple(open_book().virtual) == ("model.yaml",)
+        comments = Provenance("p", "c", {}, tuple(open_book().virtual)).comments({})
     assert next(iter(comments.items())) == ("VIRTUAL MACHINE", "computed from model.yaml")
     # Its history is one of its own.
     assert session_figures(session).machine == "virtual PM600-0007"
@@ -98,4 +98,4 @@ def test_a_virtual_session_beside_a_real_one_does_not_mark_it(tmp_path: Path) ->
         shutil.copytree(shipped_folder("fixtures") / "sessions" / name, tmp_path / name)
     with input_book():
         assert not former_sessions(read_session(tmp_path / "small"), tmp_path)
-        assert virtual_so_far() == ()
+        assert tuple(open_book().virtual) == ()

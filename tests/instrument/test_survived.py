@@ -26,8 +26,8 @@ from dbbstation.instrument.link import connected_ports, open_link
 from dbbstation.instrument.symptoms import looks_like, parity_in
 from dbbstation.system.ports import holders
 from dbbstation.virtual.control import ControlServer
+from dbbstation.virtual.wire import SocketEnd
 from dbbstation.virtual.wire_clock import ScaledClock
-from dbbstation.virtual.wire_ends import SocketEnd
 from tests.virtual.faulty import FaultyInstrument as VirtualInstrument
 
 if TYPE_CHECKING:

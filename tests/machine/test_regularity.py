@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError, StationError
-from dbbstation.machine.geometry import Machine
-from dbbstation.machine.regularity import check_joints
+from dbbstation.machine.geometry import Machine, check_joints
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.registry import dialect_named

@@ -16,7 +16,7 @@ import pytest
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.source_text import decode
 from dbbstation.nc.export import Inverse, compensated_program
-from dbbstation.nc.nominal import check_nominal
+from dbbstation.nc.mark import check_nominal
 from dbbstation.nc.toolpath import RowKind
 from tests.nc.interpreter import events, needs_rs274
 

@@ -10,7 +10,7 @@ import pytest
 from dbbstation.errors import StationError
 from dbbstation.nc.dialects.linuxcnc import LinuxCNC
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program
-from dbbstation.nc.mark import _MIXING, _SHIFTS, BITS, BY_CHANCE, _marks, _sums, is_marked, marked
+from dbbstation.nc.mark import BITS, BY_CHANCE, _marks, _sums, is_marked, marked
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import DECIMALS, in_last_decimals
 from tests.nc.whole import compensate_toolpath
@@ -115,9 +115,7 @@ def test_a_pattern_that_is_run_many_times_is_one_pattern():
         pose = np.round(draw.uniform(-50.0, 50.0, 6), 3)
         line = " ".join(f"{a}{v:.3f}" for a, v in zip("XYZABC", pose, strict=True))
         path = read_program(f"G21 G90\nG0 {line}\nG1 X0 F100\n" + f"{line}\nX0\n" * 50 + "M2\n", "x.ngc")
-        if _marks(
-            _sums(in_last_decimals(path.poses[:1], DECIMALS)), _MIXING, np.append(_SHIFTS, np.uint64(64 - BITS[4]))
-        )[0]:
+        if _marks(_sums(in_last_decimals(path.poses[:1], DECIMALS)), np.uint64(64 - BITS[4]))[0]:
             break
     assert not is_marked(path)
 

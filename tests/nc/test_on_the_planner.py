@@ -15,9 +15,8 @@ import pytest
 
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.compensate import Prefer
-from dbbstation.nc.export import Inverse, circle_programs, compensated_program, planner_of
+from dbbstation.nc.export import KEPT, Inverse, circle_programs, compensated_program, planner_of
 from dbbstation.nc.planner import cuts
-from dbbstation.nc.remarks import KEPT
 from dbbstation.plan.plan import Plan
 from dbbstation.virtual.linuxcnc import PERIOD_NS, BehindError, PlannerRun, missing, run, run_once
 from tests.nc.planner.required import needs

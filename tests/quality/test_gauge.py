@@ -11,8 +11,7 @@ from dbbstation.plan.plan import Circle, Direction
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.single import repeated
-from dbbstation.trace.cut import edges_of
-from dbbstation.trace.feeding import feeding_ways
+from dbbstation.trace.cut import edges_of, feeding_ways
 from dbbstation.trace.recording import RawCircle, Recording
 from tests.quality.sessions import finding_of, judged, run, spoilt
 from tests.quality.spoilers import coming_twice, oval, scaled

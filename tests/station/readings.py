@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.instrument.reading import Reading
 from dbbstation.station.events import SamplesRecorded
 from dbbstation.station.run_record import recording_of
-from dbbstation.virtual.path import circle_path
+from dbbstation.virtual.machine import circle_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

@@ -42,8 +42,7 @@ from dbbstation.station.assembly import Job, assemble
 from dbbstation.station.commands import Accept, Quit, Repeat, Start
 from dbbstation.station.states import RECORDING, State
 from dbbstation.virtual.cell import VirtualCell
-from dbbstation.virtual.machine import VirtualMachine, VirtualRun
-from dbbstation.virtual.path import circle_path
+from dbbstation.virtual.machine import VirtualMachine, VirtualRun, circle_path
 from dbbstation.virtual.truth import random_kinematics
 from dbbstation.virtual.wire_clock import WaitingClock
 from studies.kept_draws import drawn
@@ -57,7 +56,7 @@ if TYPE_CHECKING:
     from dbbstation.quality.finding import Finding
     from dbbstation.station.assembly import Workplace
     from dbbstation.station.engine import ReadingSource
-    from dbbstation.virtual.path import CommandedPath
+    from dbbstation.virtual.machine import CommandedPath
 
 PLAN_FILE = shipped_folder("protocols") / "plans" / "ten-minute-check.yaml"
 FEEDS_MM_MIN = (1000.0, 6000.0)

@@ -15,7 +15,7 @@ from dbbstation.nc.registry import dialect_named
 from dbbstation.plan.plan import Direction
 from dbbstation.station.programs import load_programs, read_toolpath
 from dbbstation.tasks.load import load_sessions
-from dbbstation.virtual.path import path_of
+from dbbstation.virtual.machine import path_of
 from dbbstation.virtual.truth import random_kinematics
 from tests.cli.conftest import call
 from tests.station.bench import MACHINE_FILE, bench

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.plan.plan import Circle, Direction
 from dbbstation.trace.reachable import AGREEING, OVERRIDE, SUDDEN_MM, UNDULATIONS, Reachable
-from dbbstation.virtual.path import circle_path
+from dbbstation.virtual.machine import circle_path
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
 RAISED = replace(CIRCLE, elevation_deg=40.0, centre_mm=(0.0, 0.0, 150.0 * float(np.sin(np.radians(40.0)))))

@@ -16,8 +16,7 @@ from dbbstation.plan.plan import Direction
 from dbbstation.trace.analysis import figures
 from dbbstation.trace.cut import cut
 from dbbstation.trace.recording import Recording
-from dbbstation.virtual.machine import Sizes, VirtualMachine
-from dbbstation.virtual.path import circle_path, path_of
+from dbbstation.virtual.machine import Sizes, VirtualMachine, circle_path, path_of
 from dbbstation.virtual.truth import random_kinematics
 
 if TYPE_CHECKING:

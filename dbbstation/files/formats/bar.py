@@ -131,7 +131,7 @@ def read_bar(path: Path) -> BarFile:
     Raises:
         InputError: every fault with its place.
     """
-    return without_faults(lambda faults: parse_bar(path, faults))
+    return without_faults(parse_bar, path)
 
 
 def write_bar(path: Path, bar: BarFile, *, force: bool = False) -> None:

@@ -6,10 +6,18 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator
-from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.facts.quantities import Coordinate, ExpansionUmMK, FormUm, Point, Quantity, TemperatureDegc, Text
+from dbbstation.facts.quantities import (
+    Coordinate,
+    ExpansionUmMK,
+    FormUm,
+    Point,
+    Quantity,
+    TemperatureDegc,
+    Text,
+    complaint,
+)
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, dotted, format_of, read_document, validate
@@ -30,11 +38,8 @@ def _spaced(bores: dict[int, tuple[float, float]]) -> dict[int, tuple[float, flo
         for other in names[:place]:
             distance = math.dist(bores[bore], bores[other])
             if distance < _CLOSEST_BORES_MM:
-                raise PydanticCustomError(
-                    "implausible",
-                    "bores {one} and {two} are {distance} mm apart, less than the width of a holder; expected mm",
-                    {"one": other, "two": bore, "distance": f"{distance:g}"},
-                )
+                apart = f"bores {other} and {bore} are {distance:g} mm apart, less than the width of a holder"
+                raise complaint(f"{apart}; expected mm", "implausible")
     return bores
 
 
@@ -95,7 +100,10 @@ class JigFile(Schema):
 
 def parse_jig(path: Path, faults: list[Problem]) -> JigFile | None:
     """Read a jig file; None with faults added to `faults`."""
-    document = read_document(path, JigFile, faults)
+    return _checked(read_document(path, JigFile, faults))
+
+
+def _checked(document: YamlDocument | None) -> JigFile | None:
     if document is None:
         return None
     jig = validate(document, JigFile)
@@ -169,7 +177,7 @@ def read_jig(path: Path) -> JigFile:
     Raises:
         InputError: every fault with its place.
     """
-    return without_faults(lambda faults: parse_jig(path, faults))
+    return without_faults(parse_jig, path)
 
 
 def jig_text(jig: JigFile) -> str:
@@ -191,10 +199,7 @@ def checked_jig(text: str, file: str) -> JigFile:
         InputError: the text is no valid jig file.
     """
     faults: list[Problem] = []
-    document = parse_yaml(text, file, faults)
-    jig = None if document is None else validate(document, JigFile)
-    if document is not None:
-        check_balls(document, document.data.get("jig"), document.data.get("holders"))
+    jig = _checked(parse_yaml(text, file, faults))
     if jig is None or faults:
         raise InputError([replace(fault, line=0, column=0) for fault in faults])
     return jig

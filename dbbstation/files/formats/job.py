@@ -71,7 +71,7 @@ def read_job(path: Path) -> JobFile:
     Raises:
         InputError: every fault of it and its files.
     """
-    return without_faults(lambda faults: parse_job(path, faults))
+    return without_faults(parse_job, path)
 
 
 def parse_job(path: Path, faults: list[Problem]) -> JobFile | None:

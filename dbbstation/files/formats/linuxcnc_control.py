@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING, NoReturn, TypeVar
 
 from dbbstation.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+Value = TypeVar("Value")
 
 _PARAMETER = re.compile(r"\s*(\d+)\s+([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*")
 _TOOL_WORD = re.compile(r"([A-Z])\s*([-+]?\d+(?:\.\d*)?|[-+]?\.\d+)")
@@ -16,22 +22,15 @@ def parameters_of(text: str, file: str) -> dict[int, float]:
     Raises:
         InputError: a line is no valid entry, or the file has no entries.
     """
-    found: dict[int, float] = {}
-    for number, line in enumerate(text.splitlines(), 1):
+
+    def entry(line: str) -> tuple[int, float] | None:
         match = _PARAMETER.fullmatch(line)
-        if match is None and line.strip():
-            raise InputError.of(
-                file,
-                "this is not a line of a parameter file",
-                "a line needs a number and its value",
-                line=number,
-                column=1,
-            )
-        if match is not None:
-            found[int(match[1])] = float(match[2])
-    if not found:
-        raise InputError.of(file, "no parameter in it", "name LinuxCNC's parameter file, such as linuxcnc.var")
-    return found
+        return None if match is None else (int(match[1]), float(match[2]))
+
+    said = "a parameter file", "a number and its value"
+    return _entries(text.splitlines(), file, entry, said) or _refuse(
+        file, "parameter", "parameter file, such as linuxcnc.var"
+    )
 
 
 def tools_of(text: str, file: str) -> dict[int, dict[str, float]]:
@@ -40,21 +39,29 @@ def tools_of(text: str, file: str) -> dict[int, dict[str, float]]:
     Raises:
         InputError: a line is no valid entry, or the file has no entries.
     """
-    found: dict[int, dict[str, float]] = {}
-    for number, line in enumerate(text.splitlines(), 1):
-        said = line.partition(";")[0].upper()
-        words = {letter: float(value) for letter, value in _TOOL_WORD.findall(said)}
-        if not said.strip():
-            continue
-        if "T" not in words or _TOOL_WORD.sub("", said).strip():
-            raise InputError.of(
-                file,
-                "this is not a line of a tool table",
-                "a line needs T and words such as Z52.1",
-                line=number,
-                column=1,
-            )
-        found[int(words["T"])] = words
-    if not found:
-        raise InputError.of(file, "no tool in it", "name LinuxCNC's tool table, such as tool.tbl")
+
+    def entry(line: str) -> tuple[int, dict[str, float]] | None:
+        words = {letter: float(value) for letter, value in _TOOL_WORD.findall(line)}
+        return None if "T" not in words or _TOOL_WORD.sub("", line).strip() else (int(words["T"]), words)
+
+    lines = [line.partition(";")[0].upper() for line in text.splitlines()]
+    said = "a tool table", "T and words such as Z52.1"
+    return _entries(lines, file, entry, said) or _refuse(file, "tool", "tool table, such as tool.tbl")
+
+
+def _entries(
+    lines: Sequence[str], file: str, entry: Callable[[str], tuple[int, Value] | None], said: tuple[str, str]
+) -> dict[int, Value]:
+    found: dict[int, Value] = {}
+    for number, line in enumerate(lines, 1):
+        if line.strip():
+            one = entry(line)
+            if one is None:
+                what, remedy = f"this is not a line of {said[0]}", f"a line needs {said[1]}"
+                raise InputError.of(file, what, remedy, number, 1)
+            found[one[0]] = one[1]
     return found
+
+
+def _refuse(file: str, what: str, kind: str) -> NoReturn:
+    raise InputError.of(file, f"no {what} in it", f"name LinuxCNC's {kind}")

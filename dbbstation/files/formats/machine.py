@@ -105,7 +105,7 @@ def read_machine(path: Path) -> Machine:
     Raises:
         InputError: every fault with its place.
     """
-    parts = without_faults(lambda faults: parse_machine(path, faults))
+    parts = without_faults(parse_machine, path)
     return parts.to_domain()
 
 

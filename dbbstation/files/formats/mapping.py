@@ -7,9 +7,8 @@ import re
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
-from pydantic_core import PydanticCustomError
 
-from dbbstation.facts.quantities import BarMm, Quantity, Text
+from dbbstation.facts.quantities import BarMm, Quantity, Text, complaint
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.number_language import number_language
 from dbbstation.files.source_text import without_faults
@@ -65,17 +64,13 @@ def in_run_units(meaning: str, unit: str) -> tuple[float, float]:
 
 def _meaning(text: str) -> str:
     if text not in MEANINGS:
-        raise PydanticCustomError(
-            "meaning", "`{text}` is not a meaning of a column: {known}", {"text": text, "known": ", ".join(MEANINGS)}
-        )
+        raise complaint(f"`{text}` is not a meaning of a column: {', '.join(MEANINGS)}")
     return text
 
 
 def _zone(text: str) -> str:
     if not re.fullmatch(r"[+-]\d{2}:\d{2}|UTC|[A-Za-z]+(?:/[A-Za-z_+-]+)+", text):
-        raise PydanticCustomError(
-            "zone", "`{text}` is no time zone: write such as +01:00 or Europe/Berlin", {"text": text}
-        )
+        raise complaint(f"`{text}` is no time zone: write such as +01:00 or Europe/Berlin")
     return text
 
 
@@ -93,11 +88,10 @@ class ColumnSchema(Schema):
     def _has_unit(self) -> Self:
         known = UNITS.get(self.means)
         if known is None and self.unit is not None:
-            raise PydanticCustomError("unit", "a column that is `{means}` has no unit", {"means": self.means})
+            raise complaint(f"a column that is `{self.means}` has no unit")
         if known is not None and self.unit not in known:
             said = "needs a unit" if self.unit is None else f"cannot have the unit `{self.unit}`"
-            what = {"means": self.means, "said": said, "known": ", ".join(known)}
-            raise PydanticCustomError("unit", "a column that is `{means}` {said}; give one of {known}", what)
+            raise complaint(f"a column that is `{self.means}` {said}; give one of {', '.join(known)}")
         return self
 
 
@@ -151,33 +145,29 @@ class MappingFile(Schema):
     def _complete(self) -> Self:
         meanings = [column.means for column in self.columns.values()]
         for one in sorted({m for m in meanings if m != IGNORED and meanings.count(m) > 1}):
-            raise PydanticCustomError("twice", "two columns are `{one}`; mark one of them as `ignored`", {"one": one})
+            raise complaint(f"two columns are `{one}`; mark one of them as `ignored`")
         if LENGTH in meanings and DEVIATION in meanings:
-            raise PydanticCustomError("both", "length and deviation are the same quantity; mark one as `ignored`", {})
+            raise complaint("length and deviation are the same quantity; mark one as `ignored`")
         if LENGTH not in meanings and DEVIATION not in meanings:
-            raise PydanticCustomError("length", "no column is `length` or `deviation`", {})
+            raise complaint("no column is `length` or `deviation`")
         if TIME not in meanings and ANGLE not in meanings:
-            raise PydanticCustomError("time", "no column is `time` or `angle`", {})
+            raise complaint("no column is `time` or `angle`")
         if ANGLE in meanings and self.angle is None:
-            raise PydanticCustomError(
-                "angle", "a column is an angle: `angle` must state where 0 is and in which direction it grows", {}
-            )
+            raise complaint("a column is an angle: `angle` must state where 0 is and in which direction it grows")
         if DEVIATION in meanings and self.zero_mm is None:
-            raise PydanticCustomError(
-                "zero", "a column is a deviation: `zero_mm` must state the length of deviation 0", {}
-            )
+            raise complaint("a column is a deviation: `zero_mm` must state the length of deviation 0")
         if ANGLE not in meanings and self.trace is None:
-            raise PydanticCustomError("trace", "there are no angles: `trace` has to be `whole` or `turn`", {})
+            raise complaint("there are no angles: `trace` has to be `whole` or `turn`")
         self._split_has_what_it_needs(meanings)
         if self.separator == "comma" and self.decimal == ",":
-            raise PydanticCustomError("alike", "decimal sign and separator are both a comma", {})
+            raise complaint("decimal sign and separator are both a comma")
         return self
 
     def _split_has_what_it_needs(self, meanings: list[str]) -> None:
         if (self.split == "column") != (RUN in meanings):
-            raise PydanticCustomError("split", "`split: column` and a column that is `run` belong together", {})
+            raise complaint("`split: column` and a column that is `run` belong together")
         if self.split == "direction" and ANGLE not in meanings:
-            raise PydanticCustomError("split", "`split: direction` needs a column that is an angle", {})
+            raise complaint("`split: direction` needs a column that is an angle")
 
     @property
     def numbers(self) -> NumberLanguage | None:
@@ -201,7 +191,7 @@ def read_mapping(path: Path) -> MappingFile:
     Raises:
         InputError: every fault with its place.
     """
-    return without_faults(lambda faults: parse_mapping(path, faults))
+    return without_faults(parse_mapping, path)
 
 
 def mapping_text(mapping: MappingFile) -> str:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from dbbstation.catalogue import nearest
+from dbbstation.catalogue import meant, nearest
 from dbbstation.errors import ModelError, Problem
 from dbbstation.facts.quantities import Quantity, Text
 from dbbstation.facts.record import Sha256Hex
 from dbbstation.files.atomic import refuse_existing, write_text
 from dbbstation.files.formats.machine import MachineParts, machine_data
-from dbbstation.files.inputs import note_virtual
+from dbbstation.files.inputs import open_book
 from dbbstation.files.provenance import Provenance
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
@@ -123,7 +122,7 @@ def read_model(
         InputError: every fault with its place; an installed source that cannot be used.
         ModelError: two of the sources have one name.
     """
-    return without_faults(lambda faults: parse_model(Path(path), _by_name(sources), faults))
+    return without_faults(parse_model, Path(path), _by_name(sources))
 
 
 def _by_name(sources: Mapping[str, ErrorSource] | Iterable[ErrorSource] | None) -> Mapping[str, ErrorSource]:
@@ -144,7 +143,7 @@ def parse_model(path: Path, known: Mapping[str, ErrorSource], faults: list[Probl
         return None
     document, file = read
     if file.provenance is not None and file.provenance.virtual:
-        note_virtual(path.name)
+        open_book().note_virtual(path.name)
     machine = file.machine.to_domain()
     reader = _Sources(document, machine, known)
     fitted = [reader.fitted(("sources", i), source) for i, source in enumerate(file.sources)]
@@ -220,8 +219,7 @@ class _Sources:
                 self._fault(location, f"{dotted(location)}: `{name}` of {source.name} is missing", "add it")
         for name, given in entry.parameters.items():
             if name not in expected:
-                near = difflib.get_close_matches(name, expected, n=1, cutoff=0.6)
-                remedy = f"did you mean `{near[0]}`?" if near else f"it has: {', '.join(expected)}"
+                remedy = meant(name, expected, f"it has: {', '.join(expected)}")
                 self._fault((*location, name), f"{source.name} has no parameter `{name}`", remedy, at_key=True)
             elif given.unit != expected[name].unit:
                 what = f"{source.name} {name} is in {expected[name].unit}, not in {given.unit}"

@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
-from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import Problem
 from dbbstation.facts import of_facts
-from dbbstation.facts.quantities import BarMm, Quantity, Text, twice
+from dbbstation.facts.quantities import BarMm, Quantity, Text, complaint, twice
 from dbbstation.files.formats.jig import (
     BY_CMM,
     UNDER_SPINDLE,
@@ -36,7 +35,7 @@ _RADIANS_BELOW_DEG = 0.6
 
 def _once(directions: tuple[str, ...]) -> tuple[str, ...]:
     if twice(directions):
-        raise PydanticCustomError("twice", "a direction stands here twice", {})
+        raise complaint("a direction stands here twice")
     return directions
 
 
@@ -195,7 +194,7 @@ def read_inline_plan(path: Path) -> PlanFile:
     Raises:
         InputError: every fault of both with its place.
     """
-    return without_faults(lambda faults: parse_plan(path, faults))
+    return without_faults(parse_plan, path)
 
 
 def parse_plan(path: Path, faults: list[Problem]) -> PlanFile | None:

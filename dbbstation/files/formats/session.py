@@ -10,9 +10,9 @@ from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, ValidationInfo
-from pydantic_core import PydanticCustomError, PydanticKnownError
+from pydantic_core import PydanticKnownError
 
-from dbbstation.facts.quantities import Ordinal, Point, Quantity, TemperatureDegc, Text
+from dbbstation.facts.quantities import Ordinal, Point, Quantity, TemperatureDegc, Text, complaint
 from dbbstation.facts.record import LEFT_OUT_EMPTY, Moment, OrEmpty, Record, Sha256Hex, Sha256OrEmpty
 from dbbstation.plan.bar import Bar
 from dbbstation.plan.plan import Direction
@@ -33,9 +33,7 @@ class RunState(StrEnum):
 def _inside(path: str) -> str:
     parts = PurePosixPath(path).parts
     if not parts or PurePosixPath(path).is_absolute() or ".." in parts or "\\" in path:
-        raise PydanticCustomError(
-            "outside", "`{path}` must be a path inside the session folder, with forward slashes", {"path": path}
-        )
+        raise complaint(f"`{path}` must be a path inside the session folder, with forward slashes")
     return path
 
 
@@ -168,11 +166,7 @@ class RunEntry(Record):
 
 def _sealed(run: RunEntry) -> RunEntry:
     if run.state is not RunState.RECORDING and not run.sha256:
-        raise PydanticCustomError(
-            "unsealed",
-            "the run is {state} but has no sha256; only a run that is being recorded may lack it",
-            {"state": run.state.value},
-        )
+        raise complaint(f"the run is {run.state} but has no sha256; only a run that is being recorded may lack it")
     return run
 
 

@@ -3,9 +3,8 @@
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
-from pydantic_core import PydanticCustomError
 
-from dbbstation.facts.quantities import BarMm, Ordinal, Quantity, TemperatureDegc, Text
+from dbbstation.facts.quantities import BarMm, Ordinal, Quantity, TemperatureDegc, Text, complaint
 from dbbstation.files.yaml.schema import Schema
 from dbbstation.nc.limits import LARGEST_ALLOWED_MM
 from dbbstation.plan.plan import Direction
@@ -62,7 +61,7 @@ class NumberSettings(Schema):
     @model_validator(mode="after")
     def _apart(self) -> "NumberSettings":
         if self.decimal is not None and self.decimal == self.separator:
-            raise PydanticCustomError("alike", "decimal sign and separator are both a comma; give `;` or a tab", {})
+            raise complaint("decimal sign and separator are both a comma; give `;` or a tab")
         return self
 
 
@@ -87,13 +86,9 @@ class ToleranceSettings(Schema):
     def _plausible(self) -> "ToleranceSettings":
         figure = CircleFigure(self.quantity)
         if self.directions and figure in OF_BOTH_DIRECTIONS:
-            raise PydanticCustomError(
-                "both", "{figure} is of both directions: leave `directions` out", {"figure": self.quantity}
-            )
+            raise complaint(f"{self.quantity} is of both directions: leave `directions` out")
         if self.filter is not None and figure not in FILTERED:
-            raise PydanticCustomError(
-                "filter", "no filter acts on {figure}: leave `filter` out", {"figure": self.quantity}
-            )
+            raise complaint(f"no filter acts on {self.quantity}: leave `filter` out")
         Quantity("µm", 0.01, 5_000).check(self.largest * _UM_PER[self.unit])
         return self
 
@@ -149,5 +144,5 @@ class SettingsFile(Schema):
     @model_validator(mode="after")
     def _profile_of_something(self) -> "SettingsFile":
         if self.profile is not None and self.instrument is None:
-            raise PydanticCustomError("alone", "a profile needs `instrument` in the same file", {})
+            raise complaint("a profile needs `instrument` in the same file")
         return self

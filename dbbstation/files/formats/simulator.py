@@ -6,10 +6,9 @@ import ast
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import Faults, Problem
-from dbbstation.facts.quantities import Text  # noqa: TC001 - types of fields are read when files are read
+from dbbstation.facts.quantities import Text, complaint
 from dbbstation.files.source_text import LARGEST_PROGRAM, text_in, without_faults
 from dbbstation.files.yaml.schema import Schema, read_valid
 
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
 def _name(text: str) -> str:
     if not text.isidentifier() or text.startswith("_"):
-        raise PydanticCustomError("name", "`{text}` is not a valid name in Python", {"text": text})
+        raise complaint(f"`{text}` is not a valid name in Python")
     return text
 
 
@@ -54,10 +53,9 @@ class ParameterSchema(Schema):
         low = -float("inf") if self.low is None else self.low
         high = float("inf") if self.high is None else self.high
         if not low < high:
-            raise PydanticCustomError("bounds", "`low` {low} is not below `high` {high}", {"low": low, "high": high})
+            raise complaint(f"`low` {low} is not below `high` {high}")
         if not low <= self.value <= high:
-            what = {"value": self.value, "low": low, "high": high}
-            raise PydanticCustomError("bounds", "the value {value} is outside the bounds {low} to {high}", what)
+            raise complaint(f"the value {self.value} is outside the bounds {low} to {high}")
         return self
 
 
@@ -137,16 +135,14 @@ class SimulatorFile(Schema):
     @model_validator(mode="after")
     def _apart(self) -> Self:
         if sum(one is not None for one in (self.python, self.program, self.fmu)) != 1:
-            raise PydanticCustomError("kind", "one of `python`, `program` and `fmu` is expected", {})
+            raise complaint("one of `python`, `program` and `fmu` is expected")
         if twice := sorted(set(self.parameters) & set(self.states)):
-            raise PydanticCustomError("twice", "`{one}` is both a parameter and a state", {"one": twice[0]})
+            raise complaint(f"`{twice[0]}` is both a parameter and a state")
         if "t" in self.inputs:
-            raise PydanticCustomError("time", "the input `t` already means the time; give it another name", {})
+            raise complaint("the input `t` already means the time; give it another name")
         for name, port in self.ports.items():
             if "t" in port.signals:
-                raise PydanticCustomError(
-                    "time", "the signal `t` of port `{port}` already means the time", {"port": name}
-                )
+                raise complaint(f"the signal `t` of port `{name}` already means the time")
         return self
 
 
@@ -170,7 +166,7 @@ def read_simulator(path: Path) -> SimulatorFile:
     Raises:
         InputError: every fault of both files with its place.
     """
-    return without_faults(lambda faults: parse_simulator(path, faults))
+    return without_faults(parse_simulator, path)
 
 
 def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, python: str, faults: list[Problem]) -> None:

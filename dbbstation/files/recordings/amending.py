@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ from dbbstation.files.atomic import set_read_only, write_bytes, write_folder
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.plan import plan_text, read_inline_plan
 from dbbstation.files.formats.session import Amendment
+from dbbstation.files.gateway import sha256_hex
 from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.event_log import EVENTS_FILE, read_event_log
 from dbbstation.files.recordings.lock import PATIENCE_S, SessionLock
@@ -19,6 +19,7 @@ from dbbstation.files.recordings.seal import (
     chain_faults,
     chained,
     copy_name,
+    hash_in,
     hashes,
     is_copy,
     keep_copies,
@@ -26,8 +27,8 @@ from dbbstation.files.recordings.seal import (
     sealed_over,
 )
 from dbbstation.files.recordings.session import parse_session, read_session
-from dbbstation.files.recordings.session_state import Stands, session_data, standing
-from dbbstation.files.recordings.session_store import SessionStore
+from dbbstation.files.recordings.session_state import Stands, session_data, standing, text_of
+from dbbstation.files.recordings.session_store import SessionStore, marked
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -64,7 +65,7 @@ def amend(
             new[named[plan]] = plan_text(read_inline_plan(plan)).encode()
         keep_copies(folder, hashes(folder, [*new, *seal.files]))
         now = hashes(folder, sealed_names(folder, session.names))
-        now |= {name: hashlib.sha256(content).hexdigest() for name, content in new.items()}
+        now |= {name: sha256_hex(content) for name, content in new.items()}
         if plan is not None:
             now = {name: now[name] for name in session.names}  # the jig is in the plan
         found = [
@@ -100,15 +101,15 @@ def _logged_otherwise(
         return []
     if not stands.log_sound:
         # The chain cannot go on from a log that is not what it was: another begins.
-        former_sha256 = "" if log is None else next(iter(hashes(folder, (EVENTS_FILE,)).values()), "")
+        former_sha256 = "" if log is None else hash_in(folder, EVENTS_FILE)
         former = _copied(folder, EVENTS_FILE, former_sha256) if former_sha256 else ""
         store.begin_anew()
         return [Amendment(EVENTS_FILE, former_sha256, "", former, reason, made)]
-    text = store.text_by_log()
-    name = copy_name(SESSION_FILE, hashlib.sha256(text).hexdigest())
+    text = text_of(marked(store.log.state(), store.log)).encode()
+    name = copy_name(SESSION_FILE, sha256_hex(text))
     write_folder(folder, {name: text}, force=True, own=True, read_only=is_copy)
-    store.go_on_from_log()
-    return [Amendment(SESSION_FILE, hashlib.sha256(text).hexdigest(), session.sha256, name, reason, made)]
+    store.state = store.log.state()
+    return [Amendment(SESSION_FILE, sha256_hex(text), session.sha256, name, reason, made)]
 
 
 def _copied(folder: Path, name: str, sha256: str) -> str:
@@ -132,7 +133,7 @@ def _kept(folder: Path, name: str, seal: Seal) -> str:
     """Return the path of a sealed file's former copy; empty without one."""
     stored = seal.files.get(name, "")
     copy = copy_name(name, stored)
-    return copy if stored and hashes(folder, (copy,)).get(copy) == stored else ""
+    return copy if stored and hash_in(folder, copy) == stored else ""
 
 
 def _last_link(runs: tuple[RunEntry, ...]) -> str:

@@ -17,7 +17,7 @@ from dbbstation.files.recordings.table_csv import NO_NUMBER, TableFile, missing_
 from dbbstation.files.source_text import shortened
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from dbbstation.files.formats.number_language import NumberLanguage
@@ -201,7 +201,8 @@ def read_sheet(
         what = "the sheet has uncertainties, and nothing says what they are"
         faults.add(what, "give --coverage: 2 for U (k = 2), 1 for standard uncertainties", header)
     if not faults:
-        _check_cells(table, [found[key] for key in (*AXES, *of_u) if key in found], faults)
+        for key in (*AXES, *of_u):
+            faults += table.not_finite(found[key], "correct the cell or remove the row") if key in found else ()
     refuse(faults)
     factors = UNITS[LENGTH][unit], UNITS[LENGTH][u_said or unit]
     rows = [_row(table, k, found, factors, coverage) for k in range(len(table))]
@@ -292,13 +293,6 @@ def _usual(key: str, table: TableFile) -> str | None:
     found = [name for name in found if not _NOT_MEASURED & set(words[name])]
     stated = [name for name in found if _MEASURED & set(words[name])]
     return next((names[0] for names in (stated, found) if len(names) == 1), None)
-
-
-def _check_cells(table: TableFile, names: Iterable[str], faults: Faults) -> None:
-    for name in names:
-        for k in np.flatnonzero(~np.isfinite(table.values[name])).tolist():
-            what = f"{name} is `{table.cells[name][k]}`, not a finite number"
-            faults.add(what, "correct the cell or remove the row", int(table.lines[k]))
 
 
 LIKE_A_CMM_UM = (0.01, 100.0)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import difflib
 import io
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.catalogue import meant
 from dbbstation.errors import MOST_FAULTS, Faults, InputError, Problem, refuse
 from dbbstation.files.formats.number_language import PLAIN
 from dbbstation.files.recordings.table_csv import given_table, parse_table
-from dbbstation.files.source_text import LARGEST_TABLE, first_line, numbered_lines, shortened, text_of
+from dbbstation.files.source_text import LARGEST_TABLE, first_line, numbered_lines, text_of
 from dbbstation.trace.drive import DriveRecording
 
 if TYPE_CHECKING:
@@ -113,10 +113,8 @@ def _checked(table: TableFile, warnings: Faults) -> DriveFile:
     faults = Faults(file)
     _check_names(names, header, faults)
     numbers = {name: table.values[name] for name in names if name in LARGEST}
-    for name, values in numbers.items():
-        for k in np.flatnonzero(~np.isfinite(values)).tolist():
-            what = f"{name} is `{shortened(table.cells[name][k])}`, not a finite number"
-            faults.add(what, "correct or remove the line", int(table.lines[k]))
+    for name in numbers:
+        faults += table.not_finite(name, "correct or remove the line")
     if not faults:
         _check_values(numbers, table.lines.tolist(), faults)
     refuse(faults[:MOST_FAULTS])
@@ -132,8 +130,7 @@ def _check_names(names: list[str], line: int, faults: Faults) -> None:
         shown = "commas stand between columns, the decimal sign is a dot"
     unknown = [name for name in names if name not in LARGEST]
     for missing in (name for name in REQUIRED if name not in names):
-        near = difflib.get_close_matches(missing, unknown, n=1, cutoff=0.5)
-        remedy = f"is it `{near[0]}`?" if near else shown
+        remedy = meant(missing, unknown, shown, "is it `{}`?", 0.5)
         faults.add(f"the column `{missing}` is missing", remedy, line)
     if FORCE not in names and CURRENT not in names:
         faults.add(f"neither `{FORCE}` nor `{CURRENT}` is there", shown, line)

@@ -6,7 +6,6 @@ Each line is on the disk before the session file changes. docs/formats.md descri
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import os
 import re
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from dbbstation.errors import OutputError, Problem, unwritable
 from dbbstation.files.atomic import write_bytes
-from dbbstation.files.gateway import content_of
+from dbbstation.files.gateway import content_of, sha256_hex
 from dbbstation.files.places import RUNS
 from dbbstation.files.source_text import read_bytes
 from dbbstation.system.handles import open_to_change, read_at, write_at
@@ -149,7 +148,7 @@ def _event(line: bytes, before: str) -> LoggedEvent | None:
 
 def link(before: str, text: bytes) -> str:
     """Return the link of a line: SHA-256 of the previous link and the JSON text, each followed by a line feed."""
-    return hashlib.sha256(before.encode() + b"\n" + text + b"\n").hexdigest()
+    return sha256_hex(before.encode() + b"\n" + text + b"\n")
 
 
 def line_of(before: str, what: str, at: datetime | None, members: Mapping[str, Any]) -> bytes:

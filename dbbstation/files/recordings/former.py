@@ -83,13 +83,11 @@ def _alike(now: SessionFolder, then: SessionFolder, tests: set[str]) -> bool:
     if bool(now.virtual) is not bool(then.virtual):
         return False
     serials = {one.serial_number for one in (now, then) if one.serial_number}
-    same = all(
-        name in now.plan.tests
-        and name in then.plan.tests
-        and (now.plan.tests[name].ball, now.plan.tests[name].circle)
-        == (then.plan.tests[name].ball, then.plan.tests[name].circle)
-        for name in tests
-    )
+    asked = [
+        {name: (one.ball, one.circle) for name, one in session.plan.tests.items() if name in tests}
+        for session in (now, then)
+    ]
+    same = asked[0] == asked[1] and asked[0].keys() == tests
     return len(serials) < 2 and same and not differences(now.machine, then.machine)  # noqa: PLR2004 - two different ones
 
 
@@ -144,7 +142,12 @@ def files_of(folder: Path) -> FolderFiles:
                 sessions[name] = path
             elif entry.is_file() and entry.name.endswith((".yaml", ".yml")) and _may_be_model(path):
                 models[name] = path
-            elif not is_session and depth < DEEPEST and not entry.name.startswith(".") and _is_folder(entry):
+            elif (
+                not is_session
+                and depth < DEEPEST
+                and not entry.name.startswith(".")
+                and entry.is_dir(follow_symlinks=False)
+            ):
                 look(path, depth + 1)
 
     if not folder.is_dir():
@@ -155,7 +158,8 @@ def files_of(folder: Path) -> FolderFiles:
         raise InputError.of(folder, what, f"name the folder that contains it: {real_path(folder).parent}")
     look(folder, 1)
     if not sessions:
-        raise InputError([_no_sessions(folder)])
+        what = f"no folder in it holds a {SESSION_FILE}, {DEEPEST} folders deep"
+        raise InputError.of(folder, what, "name a folder that holds the session folders of `measure` or `simulate`")
     return FolderFiles(sessions, models, closed)
 
 
@@ -164,17 +168,8 @@ def reason_of(error: OSError) -> str:
     return (error.strerror or str(error)).lower()
 
 
-def _is_folder(entry: os.DirEntry[str]) -> bool:
-    return entry.is_dir(follow_symlinks=False)
-
-
 def _may_be_model(path: Path) -> bool:
     try:
         return _MODEL_MARK in head_of(path, _MARK_WITHIN)
     except OSError:
         return False
-
-
-def _no_sessions(folder: Path) -> Problem:
-    what = f"no folder in it holds a {SESSION_FILE}, {DEEPEST} folders deep"
-    return Problem.of(folder, what, "name a folder that holds the session folders of `measure` or `simulate`")

@@ -18,7 +18,7 @@ from dbbstation.files.atomic import set_read_only
 from dbbstation.files.formats.session import PART
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.recordings.run_csv import RunFile, parse_run
-from dbbstation.system.handles import Closing
+from dbbstation.system.handles import Closing, read_at
 from dbbstation.system.replacing import rename, sync_folder
 from dbbstation.trace import columns
 
@@ -117,14 +117,9 @@ class RunWriter(Closing):
         self._last_t_s = -math.inf
         self._time_at = self.names.index(columns.TIME)
         header = run_header(test, direction, repeat, names)
-        if self.sealed_path.exists():
-            raise OutputError("this run exists already", where=str(self.sealed_path), remedy="take the next repeat")
+        self._refuse_sealed()
         with self._told():
-            # Unbuffered: a killed program loses nothing, only a power cut can.
-            self._file = self.path.open("x+b", buffering=0)
-            self._write(header)
-            os.fsync(self._file.fileno())
-            sync_folder(folder)
+            self._begin(header)
         self._synced_at = clock()
 
     def append(self, values: Sequence[float | str]) -> None:
@@ -175,25 +170,29 @@ class RunWriter(Closing):
             number = next(k for k in range(1, _MANY) if not os.path.lexists(self._foreign(k)))
             rename(self.path, self._foreign(number))
         self.path.parent.mkdir(parents=True, exist_ok=True)
+        self._begin(data)
+        lost.close()
+        _LOG.warning("%s was removed while it was recorded, and is written anew: nothing is lost", self.path)
+
+    def _refuse_sealed(self) -> None:
+        if self.sealed_path.exists():
+            raise OutputError("this run exists already", where=str(self.sealed_path), remedy="take the next repeat")
+
+    def _begin(self, data: bytes) -> None:
+        # Unbuffered: a killed program loses nothing, only a power cut can.
         self._file = self.path.open("x+b", buffering=0)
         self._write(data)
         os.fsync(self._file.fileno())
         sync_folder(self.path.parent)
-        lost.close()
-        _LOG.warning("%s was removed while it was recorded, and is written anew: nothing is lost", self.path)
 
     def _foreign(self, number: int) -> Path:
         return self.path.with_name(f"{self.path.name}.foreign-{number}")
 
     def _content(self) -> bytes:
-        size = os.fstat(self._file.fileno()).st_size
-        self._file.seek(0)
-        pieces = []
-        while size > 0 and (piece := self._file.read(size)):
-            pieces.append(piece)
-            size -= len(piece)
-        self._file.seek(0, os.SEEK_END)
-        return b"".join(pieces)
+        handle = self._file.fileno()
+        data = read_at(handle, os.fstat(handle).st_size, 0)
+        os.lseek(handle, 0, os.SEEK_END)
+        return data
 
     def read(self) -> RunFile:
         """Read the samples back.
@@ -226,8 +225,7 @@ class RunWriter(Closing):
         self.close()
         with self._told():
             digest = digest_of(self.path)
-            if self.sealed_path.exists():
-                raise OutputError("this run exists already", where=str(self.sealed_path), remedy="take the next repeat")
+            self._refuse_sealed()
             set_read_only(self.path)
             rename(self.path, self.sealed_path)
             sync_folder(self.sealed_path.parent)

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.plan.plan import Circle
     from dbbstation.quality.knowledge import Expected
     from dbbstation.trace.recording import Recording
 
@@ -89,25 +88,13 @@ def planned_circles(session: SessionFolder, model: IdentifiedModel | None) -> tu
 def circles_of_plan(session: SessionFolder, model: IdentifiedModel | None) -> tuple[Planned, ...]:
     """Return all circles of a plan as expected by a model, else by the nominal machine."""
     found = []
-    for name, test in session.plan.tests.items():
-        for direction in test.directions:
-            run = RunEntry(
-                test=name,
-                direction=direction,
-                repeat=0,
-                state=RunState.RECORDING,
-                path=session.folder,
-            )
-            with suppress(MachineError):
-                found.append(
-                    Planned(name, test.run(direction), _expected_of(session, run, _ideal(session.circle(run)), model))
-                )
+    for (name, direction), circle in session.plan.runs().items():
+        run = RunEntry(test=name, direction=direction, repeat=0, state=RunState.RECORDING, path=session.folder)
+        phi_deg = (np.arange(SECTORS) + 0.5) * FULL_TURN_DEG / SECTORS
+        ideal = RawCircle("", circle, phi_deg / circle.turning_deg_s, phi_deg, np.full(SECTORS, circle.bar_mm))
+        with suppress(MachineError):
+            found.append(Planned(name, circle, _expected_of(session, run, ideal, model)))
     return tuple(found)
-
-
-def _ideal(circle: Circle) -> RawCircle:
-    phi_deg = (np.arange(SECTORS) + 0.5) * FULL_TURN_DEG / SECTORS
-    return RawCircle("", circle, phi_deg / circle.turning_deg_s, phi_deg, np.full(SECTORS, circle.bar_mm))
 
 
 def _expected(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ from dbbstation.files.atomic import write_folder
 from dbbstation.files.formats.machine import machine_text
 from dbbstation.files.formats.plan import plan_text
 from dbbstation.files.formats.session import CommandedProgram, RunEntry, RunState, SessionDetails, SessionFile
+from dbbstation.files.gateway import sha256_hex
 from dbbstation.files.places import MACHINE_FILE, PLAN_FILE, PROGRAMS, RUNS, SESSION_FILE, refuse_recorded
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.journal import run_header, run_line, run_name
@@ -92,12 +92,12 @@ def write_session(
         if run.program is not None:
             path = f"{PROGRAMS}/{run.program[0]}"
             files[path] = run.program[1]
-            program = CommandedProgram(folder / path, hashlib.sha256(run.program[1]).hexdigest(), run.model_sha256)
-        digest = hashlib.sha256(data).hexdigest()
+            program = CommandedProgram(folder / path, sha256_hex(run.program[1]), run.model_sha256)
+        digest = sha256_hex(data)
         entries.append(of_facts(RunEntry, run, path=folder / name, sha256=digest, program=program))
     files[MACHINE_FILE], files[PLAN_FILE] = machine_text(machine), plan_text(plan)
     sealed = {name: str(files[name]).encode() for name in (MACHINE_FILE, PLAN_FILE)}
-    now = {name: hashlib.sha256(content).hexdigest() for name, content in sealed.items()}
+    now = {name: sha256_hex(content) for name, content in sealed.items()}
     files |= {copy_name(name, now[name]): content for name, content in sealed.items()}
     chain = chained(entries)
     noted = replace(details or SessionDetails(), seal=sealed_over(now, chain))

@@ -16,7 +16,7 @@ import numpy as np
 from dbbstation.errors import MOST_FAULTS, Faults, InputError, Problem, few, refuse
 from dbbstation.files.formats.session import PART, Counts
 from dbbstation.files.gateway import digest_of, opened
-from dbbstation.files.inputs import note_input, note_read
+from dbbstation.files.inputs import note_input, open_book
 from dbbstation.files.recordings.run_lines import fault_of_line, pieces_of
 from dbbstation.files.source_text import unreadable
 from dbbstation.trace import columns
@@ -133,9 +133,6 @@ def _check_sizes(found: dict[str, Floats], numbers: Sequence[int], faults: Fault
             faults.add(what, f"check the unit, {column.unit} is needed", numbers[index])
 
 
-"""Ending, after `.csv`, of a run that is being recorded."""
-
-
 @dataclass(frozen=True, eq=False)
 class RunFile:
     """A run, and the other content of its file.
@@ -166,7 +163,7 @@ def read_run(path: Path, *, sha256: str = "") -> RunFile:
     digest = hashlib.sha256()
     try:
         with opened(path) as source:
-            note_read(path)
+            open_book().note_read(path)
             blocks = _hashed(source.blocks(), digest)
             run: RunFile | InputError
             try:
@@ -226,7 +223,6 @@ def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
     faults, warnings = Faults(file), Faults(file)
     numbers = Numbers(file)
     texts: dict[str, list[str]] = {}
-    known: dict[bytes, str] = {}
     header: Mapping[str, str] = {}
     for lines in pieces_of(blocks, faults, warnings, partial=partial):
         header = lines.header
@@ -235,7 +231,7 @@ def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
             break
         if not numbers.faults.number:
             for name in (name for name in lines.columns if name not in columns.COLUMNS and name != columns.CRC):
-                texts.setdefault(name, []).extend(lines.texts(name, known))
+                texts.setdefault(name, []).extend(lines.texts(name))
     found = numbers.columns()
     refuse([*few(faults), *numbers.faults.told()])
     status = texts.pop(columns.STATUS, [])

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 import zlib
 from dataclasses import dataclass, replace
+from sys import intern
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from dbbstation.catalogue import meant
 from dbbstation.errors import InputError
 from dbbstation.files.formats.number_language import NUMBER
 from dbbstation.files.source_text import LONGEST_LINE, decode, first_line, shortened, unreadable, without_faults
@@ -22,18 +21,8 @@ if TYPE_CHECKING:
 
     from dbbstation.errors import Faults, Problem
 
-_COMMA, _NEWLINE = ord(","), ord("\n")
-_CRC_LENGTH = 8
-_NO_DIGIT = 255
-_HEX_DIGIT = np.full(256, _NO_DIGIT, dtype=np.int64)
-_HEX_DIGIT[np.frombuffer(b"0123456789abcdef", dtype=np.uint8)] = np.arange(16)
-_HEX_PLACES = 16 ** np.arange(_CRC_LENGTH - 1, -1, -1, dtype=np.int64)
 _CRC_TEXT = re.compile(rb"[0-9a-f]{8}")
 _NUMBER = re.compile(NUMBER.encode())
-
-
-_MOST_KNOWN = 10_000
-"""Up to this number of distinct texts in a column, equal texts are stored once; with more, nearly all differ."""
 
 
 @dataclass(frozen=True)
@@ -64,39 +53,19 @@ class Lines:
         """Return the lines with only these rows."""
         return replace(self, rows=self.rows[rows], numbers=self.numbers[rows], ended=True)
 
-    def texts(self, name: str, known: dict[bytes, str] | None = None) -> list[str]:
-        """Return one column as text."""
+    def texts(self, name: str) -> list[str]:
+        """Return one column as text; equal texts are stored once."""
         at = self.columns.index(name)
-        cells = [row.split(b",")[at] for row in self.rows]
-        seen = {} if known is None or len(known) > _MOST_KNOWN else known
-        for cell in set(cells) - seen.keys():
-            seen[cell] = cell.decode("utf-8", "replace").strip()
-        return [seen[cell] for cell in cells]
+        return [intern(row.split(b",")[at].decode("utf-8", "replace").strip()) for row in self.rows]
 
     def regular(self) -> bool:
         """Return whether every row has as many fields as columns."""
-        text = np.frombuffer(b"\n".join(self.rows) + b"\n", dtype=np.uint8)
-        separators = text[(text == _COMMA) | (text == _NEWLINE)]
-        count = len(self.columns)
-        if len(separators) != count * len(self.rows):
-            return False
-        table = separators.reshape(-1, count)
-        return bool((table[:, -1] == _NEWLINE).all() and (table[:, :-1] == _COMMA).all())
+        commas = len(self.columns) - 1
+        return all(row.count(b",") == commas for row in self.rows)
 
     def bad_crc(self) -> bool:
         """Return whether any row's checksum is wrong."""
-        if columns.CRC not in self.columns:
-            return False
-        if min(map(len, self.rows), default=0) <= _CRC_LENGTH:
-            return True
-        text = np.frombuffer(b"\n".join(self.rows) + b"\n", dtype=np.uint8)
-        ends = np.flatnonzero(text == _NEWLINE)
-        digits = _HEX_DIGIT[text[ends[:, None] - np.arange(_CRC_LENGTH, 0, -1)]]
-        if (text[ends - _CRC_LENGTH - 1] != _COMMA).any() or (digits == _NO_DIGIT).any():
-            return True
-        bodies = [row[: -_CRC_LENGTH - 1] for row in self.rows]
-        found = np.fromiter(map(zlib.crc32, bodies), dtype=np.int64, count=len(bodies))
-        return bool((found != digits @ _HEX_PLACES).any())
+        return columns.CRC in self.columns and any(row[-9:] != b",%08x" % zlib.crc32(row[:-9]) for row in self.rows)
 
 
 def pieces_of(blocks: Iterable[bytes], faults: Faults, warnings: Faults, *, partial: bool) -> Iterator[Lines]:
@@ -218,7 +187,7 @@ def split_head(path: Path) -> tuple[str, ...]:
         head = first_line(path)
     except OSError as error:
         raise InputError([unreadable(path, error)]) from error
-    text = without_faults(lambda faults: decode(head, str(path), faults))
+    text = without_faults(decode, head, str(path))
     return tuple(name.strip() for name in text.split(",")) if text else ()
 
 
@@ -230,8 +199,7 @@ def _said(line: bytes) -> dict[str, str]:
 def _check_columns(names: tuple[str, ...], line: int, faults: Faults) -> None:
     unknown = [name for name in names if not columns.is_known(name)]
     for missing in (name for name in columns.REQUIRED if name not in names):
-        near = difflib.get_close_matches(missing, unknown, n=1, cutoff=0.5)
-        remedy = f"is it `{near[0]}`?" if near else f"columns here: {', '.join(names)}"
+        remedy = meant(missing, unknown, f"columns here: {', '.join(names)}", "is it `{}`?", 0.5)
         unit = columns.COLUMNS[missing].unit
         faults.add(f"the column `{missing}` [{unit}] is missing", remedy, line)
     for name in sorted({name for name in names if names.count(name) > 1}):

@@ -7,7 +7,6 @@ or changed entry breaks a link. The seal's count and last link reveal removed la
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, TypeGuard
 from dbbstation.errors import Problem
 from dbbstation.files.atomic import is_leftover, write_folder
 from dbbstation.files.formats.session import Seal
+from dbbstation.files.gateway import sha256_hex
 from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.schema import dotted
 from dbbstation.files.yaml.text import load_yaml
@@ -97,8 +97,13 @@ def sealed_names(folder: Path, names: Sequence[str]) -> tuple[str, ...]:
 
 def hashes(folder: Path, names: Sequence[str]) -> dict[str, str]:
     """Return the SHA-256 of readable files by name."""
-    read = {name: read_bytes(folder / name, [], is_input=False) for name in names}
-    return {name: hashlib.sha256(data).hexdigest() for name, data in read.items() if data is not None}
+    return {name: found for name in names if (found := hash_in(folder, name))}
+
+
+def hash_in(folder: Path, name: str) -> str:
+    """Return the SHA-256 of a file of the session, empty if it cannot be read."""
+    data = read_bytes(folder / name, [], is_input=False)
+    return "" if data is None else sha256_hex(data)
 
 
 def copy_name(name: str, sha256: str) -> str:
@@ -117,8 +122,8 @@ def keep_copies(folder: Path, sealed: Mapping[str, str]) -> None:
     copies = {}
     for name, digest in sealed.items():
         copy, data = copy_name(name, digest), read_bytes(folder / name, [])
-        sound = data is not None and hashlib.sha256(data).hexdigest() == digest
-        if data is not None and sound and hashes(folder, (copy,)).get(copy) != digest:
+        sound = data is not None and sha256_hex(data) == digest
+        if data is not None and sound and hash_in(folder, copy) != digest:
             copies[copy] = data
     if copies:
         write_folder(folder, copies, force=True, own=True, read_only=is_copy)
@@ -177,7 +182,7 @@ def link(before: str, run: RunEntry) -> str:
     started = "" if run.started is None else run.started.astimezone(UTC).isoformat()
     said = (before, run.test, run.direction.value, run.repeat, run.mounting or "", started, run.sha256, *program)
     centre = ("", "", "") if run.centre_mm is None else tuple(repr(float(value)) for value in run.centre_mm)
-    return hashlib.sha256("".join(f"{value}\n" for value in (*said, *centre)).encode()).hexdigest()
+    return sha256_hex("".join(f"{value}\n" for value in (*said, *centre)))
 
 
 def chained(runs: Sequence[RunEntry]) -> tuple[RunEntry, ...]:
@@ -225,7 +230,7 @@ def _file_faults(folder: Path, file: Path, seal: Seal, names: Sequence[str]) -> 
 
 def _from(folder: Path, name: str, stored: str) -> str:
     copy = copy_name(name, stored)
-    return f" from {copy}" if hashes(folder, (copy,)).get(copy) == stored else ""
+    return f" from {copy}" if hash_in(folder, copy) == stored else ""
 
 
 def _changed_keys(before: Path, after: Path) -> str:

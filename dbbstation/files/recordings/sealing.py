@@ -17,6 +17,7 @@ from dbbstation.files.recordings.lock import PATIENCE_S, SessionLock
 from dbbstation.files.recordings.seal import (
     chained,
     copy_name,
+    hash_in,
     hashes,
     keep_copies,
     seal_faults,
@@ -113,12 +114,9 @@ def sealing(folder: Path) -> Sealing:
             faults.add(f"run {run.label} is of {wrong}: it is not sealed", "set its date right")
     refuse(faults)
     whole, linked = _with_links(hashed, path, runs)
-    spoilt = [copy for copy, digest in _copies(seal).items() if hashes(path.parent, (copy,)).get(copy) != digest]
+    copies = {copy_name(name, digest): digest for name, digest in seal.files.items()}
+    spoilt = [copy for copy, digest in copies.items() if hash_in(path.parent, copy) != digest]
     return Sealing(path, whole, files, linked, seal, text, log is not None and bool(log.events), tuple(spoilt))
-
-
-def _copies(seal: Seal) -> dict[str, str]:
-    return {copy_name(name, digest): digest for name, digest in seal.files.items()}
 
 
 def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:

@@ -15,7 +15,7 @@ from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.session import PART, RunEntry, RunState, SessionDetails, SessionFile
 from dbbstation.files.gateway import digest_of
-from dbbstation.files.inputs import note_virtual
+from dbbstation.files.inputs import open_book
 from dbbstation.files.places import SESSION_FILE, name_of
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.run_csv import (
@@ -135,7 +135,7 @@ class SessionFolder(SessionDetails):
         A run ends with its circle at the plan's feed.
         """
         circles = [(began, self.circle(run)) for run in self.runs if (began := self.started_s(run)) is not None]
-        return tuple(sorted((began, began + circle.swept_deg / circle.turning_deg_s) for began, circle in circles))
+        return tuple(sorted((began, began + circle.swept_s) for began, circle in circles))
 
     def load(self, run: RunEntry) -> RunFile:
         """Read a run and check it against session and plan.
@@ -217,9 +217,9 @@ def read_session(path: Path, *, keeps: bool = False) -> SessionFolder:
     Raises:
         InputError: every fault of session, machine and plan, every missing or changed file.
     """
-    session = without_faults(lambda faults: parse_session(path, faults))
+    session = without_faults(parse_session, path)
     if session.virtual:
-        note_virtual(session.name)
+        open_book().note_virtual(session.name)
     return replace(session, keeps=keeps)
 
 

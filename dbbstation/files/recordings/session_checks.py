@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
 from dbbstation.facts.quantities import twice
 from dbbstation.files.formats.session import SessionFile, sealed_or_part
+from dbbstation.files.gateway import sha256_hex
 from dbbstation.files.recordings.run_csv import changed
 from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.schema import dotted, read_document, validate
@@ -69,7 +69,7 @@ def _check_file(document: YamlDocument, location: Location, entry: dict[str, obj
         document.fault((*location, "file"), what, "restore it, or take the entry out")
     elif isinstance(expected, str):
         data = read_bytes(path, document.faults, is_input=False)
-        if data is not None and hashlib.sha256(data).hexdigest() != expected:
+        if data is not None and sha256_hex(data) != expected:
             document.faults.append(changed(str(path)))
 
 

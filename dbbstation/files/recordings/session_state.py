@@ -38,8 +38,7 @@ def session_state(data: Mapping[str, Any]) -> dict[str, object]:
     plain = {key: value for key, value in data.items() if key != "format"}
     if isinstance(seal, dict):
         plain["seal"] = {key: value for key, value in seal.items() if key != "log"}
-    state: dict[str, object] = _plain(plain)
-    return state
+    return _plain(plain)
 
 
 def _plain(value: object) -> Any:  # noqa: ANN401 - as plain as it came

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import os
 from dataclasses import replace
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.errors import InputError, OutputError, Problem, refuse
 from dbbstation.files.atomic import write_folder, write_text
 from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.gateway import sha256_hex
 from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.event_log import (
     EVENTS_FILE,
@@ -22,7 +22,7 @@ from dbbstation.files.recordings.event_log import (
     read_event_log,
     taken_back,
 )
-from dbbstation.files.recordings.seal import AMEND, copy_name
+from dbbstation.files.recordings.seal import AMEND, copy_name, hash_in
 from dbbstation.files.recordings.session_state import (
     READINGS,
     SEALED,
@@ -144,7 +144,7 @@ class SessionStore:
             return
         if data is None or found is None:
             raise InputError(faults)
-        self.sha256 = hashlib.sha256(found).hexdigest()
+        self.sha256 = sha256_hex(found)
         self.state = session_state(data)
         if _valid(data) and standing(data, self.log).stands is Stands.BEHIND:
             self.state = with_readings(self.log.state(), data)
@@ -177,16 +177,8 @@ class SessionStore:
                     self.log = replace(before, size=before.end)
                 raise
             _LOG.warning("%s", error)
-            self.sha256 = hashlib.sha256(said.encode()).hexdigest()
+            self.sha256 = sha256_hex(said)
         self.state = state
-
-    def text_by_log(self) -> bytes:
-        """Return the session file's text from its log."""
-        return text_of(marked(self.log.state(), self.log)).encode()
-
-    def go_on_from_log(self) -> None:
-        """Compare the next writing with the log's state, not with the file's."""
-        self.state = self.log.state()
 
     def begin_anew(self) -> None:
         """Remove an unreliable log, which the caller has already copied."""
@@ -201,12 +193,12 @@ class SessionStore:
             OutputError: the disk refuses.
         """
         found = read_bytes(self._file, [], is_input=False)
-        if found is not None and hashlib.sha256(found).hexdigest() == self.sha256:
+        if found is not None and sha256_hex(found) == self.sha256:
             return None
         found, data = self._on_disk([])
         if data is None:
             self.put_aside = self._kept(found)
-            self.sha256 = "" if found is None else hashlib.sha256(found).hexdigest()
+            self.sha256 = "" if found is None else sha256_hex(found)
         return data
 
     def accept_readings(self, data: Mapping[str, Any]) -> None:
@@ -222,8 +214,7 @@ class SessionStore:
         found = differences(_bare(known), _bare(session_state(data)))
         if found:
             raise self._another(f": {'; '.join(found)}")
-        there = read_bytes(self._file, [], is_input=False)
-        self.sha256 = "" if there is None else hashlib.sha256(there).hexdigest()
+        self.sha256 = hash_in(self._file.parent, SESSION_FILE)
 
     def _another(self, what: str) -> OutputError:
         return OutputError(
@@ -255,7 +246,7 @@ class SessionStore:
     def _kept(self, found: bytes | None) -> str:
         if not found:
             return ""
-        name = copy_name(SESSION_FILE, hashlib.sha256(found).hexdigest())
+        name = copy_name(SESSION_FILE, sha256_hex(found))
         if not (self._file.parent / name).exists():
             write_folder(self._file.parent, {name: found}, own=True)
         _LOG.warning("%s is written anew; as it was: %s", self._file, name)
@@ -263,7 +254,7 @@ class SessionStore:
 
     def _put(self, text: str) -> None:
         write_text(self._file, text, force=True, rewrites=True)
-        self.sha256 = hashlib.sha256(text.encode()).hexdigest()
+        self.sha256 = sha256_hex(text)
 
 
 def _valid(data: Mapping[str, Any]) -> bool:

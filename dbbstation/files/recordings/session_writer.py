@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.atomic import remove_leftovers, write_bytes
 from dbbstation.files.formats.session import CommandedProgram, LogMark, Note, RunEntry, RunState, SessionDetails
+from dbbstation.files.gateway import sha256_hex
 from dbbstation.files.places import PROGRAMS, RUNS, SESSION_FILE
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.journal import RunWriter, run_name
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from dbbstation.files.formats.plan import PlanFile
     from dbbstation.files.formats.session import Counts, ReadBy
-    from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.plan import Direction
 
@@ -44,7 +43,7 @@ class SessionWriter(Closing):
         self._lock = lock
         self._store = SessionStore(folder, clock)
         self._clock = clock
-        self._session = self._kept = replace(read_session(folder), sha256=self._store.sha256)
+        self.session = self._kept = replace(read_session(folder), sha256=self._store.sha256)
 
     def close(self) -> None:
         """Unlock the session for others; may be called twice."""
@@ -92,7 +91,7 @@ class SessionWriter(Closing):
         return cls._locked(folder, patience_s, clock)
 
     def _take_over(self) -> None:
-        folder = self._session.folder
+        folder = self.session.folder
         remove_leftovers(folder)
         # A run that was sealed when the station died only lacks its hash.
         for run in self.runs:
@@ -104,20 +103,15 @@ class SessionWriter(Closing):
         self._write("taken over")
 
     @property
-    def session(self) -> SessionFolder:
-        """Return the session as it is on the disk."""
-        return self._session
-
-    @property
     def runs(self) -> tuple[RunEntry, ...]:
         """Return runs in starting order."""
-        return self._session.runs
+        return self.session.runs
 
     def next_repeat(self, test: str, direction: Direction) -> int:
         """Return the repeat after every existing one."""
         taken = [run.repeat for run in self.runs if (run.test, run.direction) == (test, direction)]
         repeat = max(taken, default=0) + 1
-        while any(self._session.folder.glob(f"{RUNS}/{run_name(test, direction, repeat)}*")):
+        while any(self.session.folder.glob(f"{RUNS}/{run_name(test, direction, repeat)}*")):
             repeat += 1
         return repeat
 
@@ -145,13 +139,13 @@ class SessionWriter(Closing):
             InputError: the plan has no such run.
             OutputError: the disk refuses.
         """
-        if test not in self._session.plan.tests or direction not in self._session.plan.tests[test].directions:
+        if (test, direction) not in self.session.plan.runs():
             what = f"the plan has no run {test} {direction}"
-            raise InputError.of(self._session.plan_path, what, "choose a test of the plan")
-        if self._session.seal is None:
+            raise InputError.of(self.session.plan_path, what, "choose a test of the plan")
+        if self.session.seal is None:
             self._seal()
         repeat = self.next_repeat(test, direction)
-        writer = RunWriter(self._session.folder / RUNS, test, direction, repeat, columns)
+        writer = RunWriter(self.session.folder / RUNS, test, direction, repeat, columns)
         entry = RunEntry(
             test=test,
             direction=direction,
@@ -205,7 +199,7 @@ class SessionWriter(Closing):
         Raises:
             OutputError: the disk refuses.
         """
-        self._session = replace(self._session, notes=(*self._session.notes, note))
+        self.session = replace(self.session, notes=(*self.session.notes, note))
         self._write("noted")
 
     def take_in(self, path: Path) -> RunEntry:
@@ -216,9 +210,7 @@ class SessionWriter(Closing):
             OutputError: the disk refuses.
         """
         found, file = part_entry(path), str(path)
-        if found is None or (found.test, found.direction) not in {
-            (name, direction) for name, test in self._session.plan.tests.items() for direction in test.directions
-        }:
+        if found is None or (found.test, found.direction) not in self.session.plan.runs():
             what = "the file does not say which run of this plan it is"
             raise InputError.of(file, what, "its first lines name test, direction and repeat", line=1)
         if any(run.key == found.key for run in self.runs):
@@ -226,7 +218,7 @@ class SessionWriter(Closing):
             raise InputError.of(file, what, "give one of them another repeat", line=1)
         digest = sha256_of(path)
         entry = replace(found, state=RunState.COMPLETE, sha256=digest)
-        self._session.load(entry)
+        self.session.load(entry)
         taken = self._put(entry)
         self._write("taken in")
         return taken
@@ -237,49 +229,49 @@ class SessionWriter(Closing):
         Raises:
             OutputError: another program has that name, or the disk refuses.
         """
-        path = self._session.folder / PROGRAMS / name
-        digest = hashlib.sha256(content).hexdigest()
+        path = self.session.folder / PROGRAMS / name
+        digest = sha256_hex(content)
         if not (path.is_file() and sha256_of(path) == digest):
             write_bytes(path, content, rewrites=True)
         return CommandedProgram(path, digest, model_sha256)
 
     def _seal(self) -> None:
-        session = self._session
+        session = self.session
         found = hashes(session.folder, sealed_names(session.folder, session.names))
         keep_copies(session.folder, found)
         runs = chained(session.runs)
-        self._session = replace(session, runs=runs, seal=sealed_over(found, runs))
+        self.session = replace(session, runs=runs, seal=sealed_over(found, runs))
 
     def _put(self, entry: RunEntry) -> RunEntry:
         runs = tuple(({run.key: run for run in self.runs} | {entry.key: entry}).values())
-        seal = self._session.seal
+        seal = self.session.seal
         if seal is not None:
             runs = chained(runs)
             seal = sealed_over(seal.files, runs)
-        self._session = replace(self._session, runs=runs, seal=seal)
+        self.session = replace(self.session, runs=runs, seal=seal)
         return next(run for run in runs if run.key == entry.key)
 
     def _write(self, what: str) -> None:
         try:
             self._take_readings()
-            session = self._session
+            session = self.session
             self._store.write(session_data(session.folder, session.names, session, session.runs), what)
         except BaseException:
-            self._session = self._kept
+            self.session = self._kept
             raise
         seal = session.seal
         if seal is not None:
             seal = replace(seal, log=LogMark(len(self._store.log.events), self._store.log.links[-1]))
-        self._session = self._kept = replace(session, sha256=self._store.sha256, seal=seal)
+        self.session = self._kept = replace(session, sha256=self._store.sha256, seal=seal)
 
     def _take_readings(self) -> None:
         other = self._store.changed_meanwhile()
         if other is not None:
-            readings = readings_in(self._session.folder / SESSION_FILE, self._session.plan)
+            readings = readings_in(self.session.folder / SESSION_FILE, self.session.plan)
             self._store.accept_readings(other)
-            self._session = replace(self._session, set_up_errors=readings)
+            self.session = replace(self.session, set_up_errors=readings)
         if self._store.put_aside is not None:
             where = f"; as it was: {self._store.put_aside}" if self._store.put_aside else ""
             text = f"the session file could not be read and was written anew{where}"
-            self._session = replace(self._session, notes=(*self._session.notes, Note(self._clock(), text)))
+            self.session = replace(self.session, notes=(*self.session.notes, Note(self._clock(), text)))
             self._store.put_aside = None

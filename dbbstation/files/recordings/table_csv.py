@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections import Counter
 from dataclasses import dataclass, field
@@ -11,13 +10,14 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from dbbstation.catalogue import meant
 from dbbstation.errors import MOST_FAULTS, Faults, InputError, Problem, refuse
 from dbbstation.files.csv_rows import csv_cells, csv_text
 from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
 from dbbstation.files.source_text import LARGEST_TABLE, numbered_lines, shortened, text_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -62,21 +62,22 @@ class TableFile:
 
     def faults_of(self, name: str) -> list[Problem]:
         """Return a column's cells that are neither numbers nor empty, with their lines."""
-        found = Faults(self.file)
         if np.isfinite(self.values[name]).all():
-            return found
+            return []
         comma = next((cell for cell in self.cells[name] if _COMMA.fullmatch(cell)), None)
         if comma is not None and all(
             _COMMA.fullmatch(cell) or _WHOLE.fullmatch(cell) or cell.lower() in NO_NUMBER for cell in self.cells[name]
         ):
             what = f"{name} has decimal commas, such as `{shortened(comma)}`"
-            found.add(what, "state the decimal sign: `--decimal ,`", self.header)
-            return found
-        for line, cell, value in zip(self.lines.tolist(), self.cells[name], self.values[name], strict=True):
-            if not np.isfinite(value) and cell.lower() not in NO_NUMBER:
+            return [Problem.of(self.file, what, "state the decimal sign: `--decimal ,`", self.header)]
+        return [*self.not_finite(name, "correct the cell, or leave it empty", NO_NUMBER)]
+
+    def not_finite(self, name: str, remedy: str, but: Collection[str] = ()) -> Iterator[Problem]:
+        """Return a fault of each cell of a column without a finite number, except for some in small letters."""
+        for k in np.flatnonzero(~np.isfinite(self.values[name])).tolist():
+            if (cell := self.cells[name][k]).lower() not in but:
                 what = f"{name} is `{shortened(cell)}`, not a finite number"
-                found.add(what, "correct the cell, or leave it empty", line)
-        return found
+                yield Problem(self.file, int(self.lines[k]), 0, what, remedy)
 
     def is_text(self, name: str) -> bool:
         """Return whether a column has no number."""
@@ -190,8 +191,7 @@ def _seconds(cells: Sequence[str]) -> Floats | None:
 
 def missing_column(name: str, names: Sequence[str], file: str, line: int) -> Problem:
     """Return the fault of a missing column, and name likely columns."""
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    remedy = f"did you mean `{near[0]}`?" if near else f"columns here: {', '.join(names)}"
+    remedy = meant(name, names, f"columns here: {', '.join(names)}", likeness=0.5)
     return Problem(file, line, 0, f"there is no column `{name}`", remedy)
 
 

@@ -1,6 +1,5 @@
 """Common base of schemas, strict and frozen; faults become problems with a position."""
 
-import difflib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from inspect import get_annotations
@@ -11,6 +10,7 @@ from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, Vali
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, ErrorDetails
 
+from dbbstation.catalogue import meant
 from dbbstation.errors import MOST_FAULTS, Problem, few
 from dbbstation.facts.record import STRICT, Record, describe
 from dbbstation.facts.serialise import adapter
@@ -148,8 +148,7 @@ def _problem(document: YamlDocument, schema: type[Any], detail: ErrorDetails) ->
         return document.problem(location, f"{_within(location)}the key `{missing}` is missing", "add it")
     if kind in {"extra_forbidden", "invalid_key", "unexpected_keyword_argument"}:
         allowed = list(keys_at(schema, location[:-1]))
-        near = difflib.get_close_matches(str(location[-1]), allowed, n=1, cutoff=0.6)
-        remedy = f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(sorted(allowed))}"
+        remedy = meant(str(location[-1]), allowed, f"known here: {', '.join(sorted(allowed))}")
         what = f"{_within(location[:-1])}the key `{shortened(str(location[-1]))}` is not known"
         return document.problem(location, what, remedy, at_key=True)
     what, remedy = _in_words(kind, given, context, detail["msg"])
@@ -174,8 +173,7 @@ def _in_words(kind: str, given: object, context: dict[str, Any], message: str) -
         return f"{limit} values were expected, not {context['actual_length']}", "check the list"
     if kind == "union_tag_invalid":
         known = context["expected_tags"].replace("'", "").split(", ")
-        near = difflib.get_close_matches(context["tag"], known, n=1, cutoff=0.6)
-        remedy = f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(known)}"
+        remedy = meant(context["tag"], known, f"known here: {', '.join(known)}")
         return f"{context['discriminator'].strip(chr(39))} `{shortened(context['tag'])}` is not known", remedy
     if kind == "implausible":
         return message, "check the unit"

@@ -234,10 +234,10 @@ class _Walk:
         self._open.add(id(node))
         data: Any = None
         if isinstance(node, SequenceNode):
-            self._untagged(node, "seq")
+            self._refuse_tag(node, "seq")
             data = tuple(self.value(item, (*location, index)) for index, item in enumerate(node.value))
         elif isinstance(node, MappingNode):
-            self._untagged(node, "map")
+            self._refuse_tag(node, "map")
             data = self._mapping(node, location)
         self._open.discard(id(node))
         return data
@@ -279,9 +279,7 @@ class _Walk:
         if kind == "merge":
             self._fault(node, "merge keys `<<` are not allowed", "write the entries out")
         else:
-            self._fault(
-                node, f"the tag `{shortened(str(node.tag))}` is not allowed", "remove it, values need no tags here"
-            )
+            self._refuse_tag(node)
         return None
 
     def _number(self, node: ScalarNode, kind: str, digits: str) -> float | int | None:
@@ -298,11 +296,10 @@ class _Walk:
             return whole
         return None
 
-    def _untagged(self, node: Node, kind: str) -> None:
-        if node.tag != _TAG + kind:
-            self._fault(
-                node, f"the tag `{shortened(str(node.tag))}` is not allowed", "remove it, values need no tags here"
-            )
+    def _refuse_tag(self, node: Node, but: str = "") -> None:
+        if node.tag != _TAG + but:
+            what = f"the tag `{shortened(str(node.tag))}` is not allowed"
+            self._fault(node, what, "remove it, values need no tags here")
 
     def _fault(self, node: Node, what: str, remedy: str) -> None:
         self.faults.add(what, remedy, *_place(node))

@@ -153,8 +153,8 @@ def arc_of(
         BadLine: no such arc.
     """
     column, axes, code = block.first_column, PLANES[plane], "G2" if clockwise else "G3"
-    radius = block.words.pop("R", None)
-    offsets = [block.words.pop(CENTRES[axis], None) for axis in axes]
+    radius, letters = block.take("R"), " and ".join(CENTRES[axis] for axis in sorted(axes))
+    offsets = [block.take(CENTRES[axis]) for axis in axes]
     other = block.words.get(CENTRES[3 - int(axes.sum())])
     if other is not None and other.value == 0.0 and not absolute:
         del block.words[other.letter]  # as some posts write: the centre lies in the plane
@@ -168,13 +168,11 @@ def arc_of(
             raise block.fault(what, "check R, or write a full turn with its centre", radius)
         return Arc(start, target, by_radius, clockwise=clockwise, turns=turns, plane=plane)
     if not any(offsets):
-        letters = " and ".join(CENTRES[axis] for axis in sorted(axes))
         raise block.fault(f"{code} needs {letters}, or R", "give the centre", column)
     centre = np.array([0.0 if word is None else word.value * state.unit_mm for word in offsets])
     if not absolute:
         centre += start[axes]
     elif not all(offsets):
-        letters = " and ".join(CENTRES[axis] for axis in sorted(axes))
         raise block.fault(f"G90.1 needs both {letters}", "give both, or G91.1", column)
     else:
         centre += np.array(state.offset)[axes]
@@ -197,7 +195,7 @@ def curve_of(block: ProgramBlock, state: ControlState, target: Floats) -> Floats
     """
     code = block.codes[ModalGroup.SMOOTHING]
     letters = "IJPQ" if code.value == 5.0 else "IJ"  # noqa: PLR2004
-    words = [word.value for letter in letters if (word := block.words.pop(letter, None)) is not None]
+    words = [word.value for letter in letters if (word := block.take(letter)) is not None]
     if len(words) < len(letters):
         what = f"{name('G', code.value)} needs {', '.join(letters)}"
         raise block.fault(what, "give the control points", code)
@@ -217,7 +215,7 @@ def curve_of(block: ProgramBlock, state: ControlState, target: Floats) -> Floats
 
 
 def _turns(block: ProgramBlock) -> int:
-    word = block.words.pop("P", None)
+    word = block.take("P")
     if word is None:
         return 1
     if not word.counts(1.0):

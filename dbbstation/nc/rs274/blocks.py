@@ -133,13 +133,6 @@ _REMEDIES: dict[float, str] = {
 }
 
 
-def remedy_of_letter(letter: str) -> str:
-    """Return the remedy for an unsupported letter."""
-    return (
-        "the model has no such axis: post the program without it" if letter in "UVW" else "post the program without it"
-    )
-
-
 def name(letter: str, value: float) -> str:
     """Return a code as people write it: G1, G91.1."""
     return f"{letter}{value:.10g}"
@@ -175,6 +168,10 @@ class ProgramBlock:
     comments: list[str] = field(default_factory=list)
     message: str = ""
 
+    def take(self, letter: str) -> Word | None:
+        """Return the word of a letter, which is then used, or None."""
+        return self.words.pop(letter, None)
+
     def code(self, group: ModalGroup) -> float | None:
         """Return the code of a group, or None."""
         word = self.codes.get(group)
@@ -208,7 +205,8 @@ def block_of(line: str, place: Place, value_of: Callable[[int | str], float | No
             _take_code(block, token)
         elif token.letter not in LETTERS:
             what = f"words with the letter {token.letter} are not read ({token.letter}{token.value:g})"
-            raise place.fault(token.column, what, remedy_of_letter(token.letter))
+            why = "the model has no such axis: " if token.letter in "UVW" else ""
+            raise place.fault(token.column, what, f"{why}post the program without it")
         elif token.letter == "N" and (block.words or block.codes or block.comments):
             raise place.fault(
                 token.column, "the line number N is not at the line's begin", "write it at the line's begin"

@@ -11,9 +11,8 @@ import numpy as np
 
 from dbbstation.errors import Problem
 from dbbstation.nc.rs274.blocks import BLANKS
-from dbbstation.nc.rs274.expressions import ValueReader
 from dbbstation.nc.rs274.lines import ProgramLines, plain_lines
-from dbbstation.nc.rs274.tokens import BadLine, Place
+from dbbstation.nc.rs274.tokens import BadLine, Place, ValueReader
 from dbbstation.nc.setup import ControlSetup
 from dbbstation.nc.spilled import LongText
 
@@ -446,13 +445,10 @@ class Flow:
             self._next = begin.line
 
     def _break(self, word: OLine, place: Place) -> None:
-        self._next = self._end_of_loop(word, place).line
+        end = self._find(word, place, ("endwhile", "endrepeat", "while"))
+        self._next = end.line - (word.keyword == "continue")
 
-    def _continue(self, word: OLine, place: Place) -> None:
-        self._next = self._end_of_loop(word, place).line - 1
-
-    def _end_of_loop(self, word: OLine, place: Place) -> OLine:
-        return self._find(word, place, ("endwhile", "endrepeat", "while"))
+    _continue = _break
 
     def _find(self, word: OLine, place: Place, keywords: tuple[str, ...]) -> OLine:
         for each in self._labels[word.label]:

@@ -136,7 +136,7 @@ def plain_lines(letters: NDArray[np.uint8], at: int) -> PlainLines:
     for most in (LEAST_LINES, MOST_LINES):
         head, digits = np.full((most, 2), -1, dtype=np.int64), np.zeros((most, 7), dtype=np.int64)
         decimals = np.full((most, 7), -1, dtype=np.int64)
-        count = _read(letters, at, head, digits, decimals, _LETTERS)
+        count = _read(letters, at, head, digits, decimals)
         if count < most:
             break
     decimals = decimals[:count]
@@ -152,12 +152,11 @@ def _read(
     head: Integers,
     digits: Integers,
     decimals: Integers,
-    names: NDArray[np.uint8],
 ) -> int:
     for row in range(len(head)):
         at = _after_number(letters, at, head[row])
         at = _after_motion(letters, at, head[row]) if at >= 0 else -1
-        at = _after_axes(letters, at, digits[row], decimals[row], names) if at >= 0 else -1
+        at = _after_axes(letters, at, digits[row], decimals[row]) if at >= 0 else -1
         if at < 0:
             return row
     return len(head)
@@ -190,11 +189,10 @@ def _after_axes(
     at: int,
     digits: Integers,
     decimals: Integers,
-    names: NDArray[np.uint8],
 ) -> int:
     first = at
     for name in range(7):
-        if letters[at] == names[name] and (name < _F or (at > first and _ZERO <= letters[at + 1] <= _NINE)):
+        if letters[at] == _LETTERS[name] and (name < _F or (at > first and _ZERO <= letters[at + 1] <= _NINE)):
             end, digits[name], decimals[name] = _number(letters, at + 1)
             if end < 0:
                 return -1

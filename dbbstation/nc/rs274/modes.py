@@ -12,9 +12,9 @@ from dbbstation.nc.rs274.arcs import CENTRES
 from dbbstation.nc.rs274.blocks import CURVES, CYCLES, NEEDED, STORED, ModalGroup, name
 from dbbstation.nc.rs274.cutter import Beside, Cutter
 from dbbstation.nc.rs274.cycles import ModalCycle
-from dbbstation.nc.rs274.expressions import shown
 from dbbstation.nc.rs274.flow import Flow
 from dbbstation.nc.rs274.state import AXES, ControlState
+from dbbstation.nc.rs274.tokens import shown
 from dbbstation.nc.toolpath import (
     ALL_AXES,
     EXACT_STOP_MM,
@@ -190,7 +190,7 @@ class Modes:
             self._speed = Feed(0.0, 0.0)
         elif self._per_move:
             self._speed = Feed(0.0, 0.0)  # each move has its own
-        word = block.words.pop("F", None)
+        word = block.take("F")
         if word is not None:
             if word.value < 0.0:
                 raise block.fault(f"the feed is negative (F{word.value:g})", "give a positive feed", word)
@@ -205,11 +205,11 @@ class Modes:
             raise block.fault(f"T{tool.value:g} is no tool", "give a whole number", tool)
         change, number_set = block.codes.get(ModalGroup.TOOL), None
         if change is not None and change.value == SET_TOOL:
-            number_set = block.words.pop("Q", None)
+            number_set = block.take("Q")
             if number_set is None or not number_set.counts(0.0):
                 raise block.fault("M61 needs Q", "give the number of the tool", change)
-        said = [block.words.pop("T", None), change, number_set]
-        said += [block.codes.get(ModalGroup.SPEED), block.words.pop("S", None)]
+        said = [block.take("T"), change, number_set]
+        said += [block.codes.get(ModalGroup.SPEED), block.take("S")]
         self._spindle_speed = self._spindle_speed if speed is None else f"S{speed.value:g}"
         said += [block.codes.get(group) for group in (ModalGroup.SPINDLE, ModalGroup.COOLANT, ModalGroup.OVERRIDE)]
         output, switch = (block.codes.get(group) for group in (ModalGroup.OUTPUT, ModalGroup.SWITCH))
@@ -219,7 +219,7 @@ class Modes:
         needed = "" if output is None else NEEDED.get(output.value, "")
         if output is not None and needed and needed not in block.words:
             raise block.fault(f"M{output.value:g} needs {needed}", "give the output's number", output)
-        said += [output, switch, *(block.words.pop(letter, None) for letter in "EPQ" if output or switch)]
+        said += [output, switch, *(block.take(letter) for letter in "EPQ" if output or switch)]
         text = " ".join(f"{word.letter}{number(word.value)}" for word in said if word is not None)
         if text:
             self.path.say(RowKind.FUNCTION, text, line=block.place.line)
@@ -269,7 +269,7 @@ class Modes:
         return name("G", self._motion or 0.0) if is_arc and block.words.keys() & set(AXES + CENTRES + POLAR) else ""
 
     def _dwell_s(self, block: ProgramBlock) -> float:
-        word = block.words.pop("P", None) or block.words.pop("X", None)  # X as for Fanuc
+        word = block.take("P") or block.take("X")  # X as for Fanuc
         if word is None or word.value < 0.0:
             what = "G4 needs the seconds to wait"
             raise block.fault(what, "write G4 P0.5 for half a second", block.codes[ModalGroup.ONCE])
@@ -296,7 +296,7 @@ class Modes:
             self._smoothing(block)
 
     def _cutter_radius(self, block: ProgramBlock) -> None:
-        word, block_number = block.codes.get(ModalGroup.CUTTER), block.words.pop("D", None)
+        word, block_number = block.codes.get(ModalGroup.CUTTER), block.take("D")
         number = self._radius_number = block_number or self._radius_number
         changes = block.codes.keys() & (_NOT_BESIDE if word is None else _BEHIND_CUTTER)
         changes -= {ModalGroup.ONCE} if block.code(ModalGroup.ONCE) == DWELL else set()
@@ -345,7 +345,7 @@ class Modes:
         word = block.codes[ModalGroup.PATH]
         corner = 0.0 if word.value == 61.0 else EXACT_STOP_MM  # noqa: PLR2004
         if word.value == 64.0:  # noqa: PLR2004
-            allowed, _ = block.words.pop("P", None), block.words.pop("Q", None)
+            allowed, _ = block.take("P"), block.take("Q")
             # LinuxCNC takes P0 for no bound, as if P were not there.
             corner = allowed.value * self._state.unit_mm if allowed is not None and allowed.value > 0.0 else math.inf
         self.path.corner_mm = corner
@@ -358,7 +358,7 @@ class Modes:
 
     def _smoothing(self, block: ProgramBlock) -> None:
         """Remove high-speed modes of other controls (G5 P, G5.1 Q, G187)."""
-        word, said = block.codes[ModalGroup.SMOOTHING], [block.words.pop(letter, None) for letter in "EPQR"]
+        word, said = block.codes[ModalGroup.SMOOTHING], [block.take(letter) for letter in "EPQR"]
         if block.words.keys() & set(AXES + CENTRES):
             raise block.fault(f"{name('G', word.value)} with axes is not read", CURVES, word)
         text = " ".join(f"{each.letter}{each.value:g}" for each in (word, *said) if each is not None)
@@ -380,7 +380,7 @@ class Modes:
                 what = "G43.4 while A or B is not zero"
                 raise block.fault(what, "post the program for the tip, without G43.4", word)
             self._upright = True  # A and B must stay so: G43.4 would tilt the tool length
-        tool = block.words.pop("H", None)
+        tool = block.take("H")
         which = self._state.use_length(tool, block, word)
         if which not in self._state.tools_set:  # what the program sets itself needs no check
             self._hold(f"H{which}", self._state.length)

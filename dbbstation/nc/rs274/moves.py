@@ -75,7 +75,7 @@ class Moves(Modes):
             self._cut(block, arc.poses(), (arc.length_mm, 0.0), arc=arc.chord)
         self._left_contour = False
         for letter in (*named, *POLAR):
-            block.words.pop(letter, None)
+            block.take(letter)
 
     def _arc(self, block: ProgramBlock, target: Floats) -> Arc:
         if self._left_contour:
@@ -280,7 +280,7 @@ class Moves(Modes):
 
     def _run_cycle(self, block: ProgramBlock, named: list[str]) -> None:
         column, code = block.first_column, self._motion or 0.0
-        times = block.words.pop("L", None)
+        times = block.take("L")
         if self._plane != 0 or self._per_move or {"A", "B", "C"} & set(named):
             what = f"{name('G', code)} with {'another plane than G17' if self._plane else 'G93, or A, B, C'}"
             raise block.fault(what, "post cycles as single moves", column)
@@ -300,7 +300,7 @@ class Moves(Modes):
                 self._cycle_step(block, step.what, step.depth)
         self.path.corner_mm = corner
         for letter in (*named, *POLAR):
-            block.words.pop(letter, None)
+            block.take(letter)
 
     def _target_of_cycle(self, block: ProgramBlock) -> Floats:
         motion, self._motion = self._motion, RAPID

@@ -294,7 +294,7 @@ class _Interpreter(Moves):
         if call == 99.0:  # noqa: PLR2004
             self.flow.back(block.place)
         elif call is not None:
-            which, times = block.words.pop("P", None), block.words.pop("L", None)
+            which, times = block.take("P"), block.take("L")
             if which is None:
                 raise block.fault("M98 needs P", "give the O number", block.codes[ModalGroup.CALL])
             self.flow.call(which.value, 1.0 if times is None else times.value, block.place)

@@ -71,7 +71,7 @@ class ControlState:
         word = block.codes[ModalGroup.ONCE]
         if block.words.get("L", word).value == 1.0:
             return self._set_tool(block), "", ()
-        kind, which, turned = (block.words.pop(letter, None) for letter in "LPR")
+        kind, which, turned = (block.take(letter) for letter in "LPR")
         if kind is None or kind.value not in {2.0, 20.0} or which is None or which.value not in range(10):
             said = "" if kind is None else f" L{kind.value:g}"
             raise block.fault(f"G10{said} is not read", "G10 L1, L2 and L20 with P0 to P9 are", word)
@@ -88,7 +88,7 @@ class ControlState:
         return f"G10 L2 P{system} {words}", SYSTEMS[system - 1], before
 
     def _set_tool(self, block: ProgramBlock) -> str:
-        word, which, radius = block.words.pop("L"), block.words.pop("P", None), block.words.pop("R", None)
+        word, which, radius = block.words.pop("L"), block.take("P"), block.take("R")
         if which is None or not which.counts(1.0):
             raise block.fault("G10 L1 without the number of a tool", "give P, a whole number from 1", word)
         tool, said = int(which.value), f"G10 L1 P{which.value:g}"
@@ -176,7 +176,7 @@ class ControlState:
         return None if np.isnan(place) else place / (self.unit_mm if axis < 3 else 1.0)  # noqa: PLR2004
 
     def _taken(self, block: ProgramBlock) -> list[tuple[int, float]]:
-        words = [(axis, block.words.pop(letter, None)) for axis, letter in enumerate(AXES)]
+        words = [(axis, block.take(letter)) for axis, letter in enumerate(AXES)]
         return [(axis, word.value * (self.unit_mm if axis < 3 else 1.0)) for axis, word in words if word]  # noqa: PLR2004
 
     def _known(self, axis: int, block: ProgramBlock, word: Word) -> float:

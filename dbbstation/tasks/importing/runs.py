@@ -162,9 +162,8 @@ class Reader:
         if self.mapping.split == "gaps":
             t_s = self._numbers(table, TIME)
             known = every if t_s is None else every[np.isfinite(t_s)]
-            circles = [test.run(direction) for test in self.plan.tests.values() for direction in test.directions]
             timed = None if t_s is None else t_s[known]
-            parts = parts_by_gaps(timed, table.table.lines[known], longest_pause_s(circles))
+            parts = parts_by_gaps(timed, table.table.lines[known], longest_pause_s(list(self.plan.runs().values())))
             return [known[part] for part in parts]
         angle = self._numbers(table, ANGLE)
         if angle is None:
@@ -288,11 +287,7 @@ class Reader:
         of_runs = any(self.mapping.column(one) is not None for one in OF_RUNS)
         if angle is None or of_runs or not np.all(np.isfinite(angle)):
             return None
-        spans = [
-            unplanned_span_deg(angle, test.run(direction))
-            for test in self.plan.tests.values()
-            for direction in test.directions
-        ]
+        spans = [unplanned_span_deg(angle, circle) for circle in self.plan.runs().values()]
         return next(iter(spans), None) if all(span is not None for span in spans) else None
 
     def says_test(self, table: ForeignTable) -> bool:

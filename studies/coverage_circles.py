@@ -13,8 +13,7 @@ from dbbstation.circles.analysis import CircleAnalysis, analyse, analyse_pair, r
 from dbbstation.circles.budget import RANGES, Budget, SetUpKnowledge, budgets, pair_budgets
 from dbbstation.circles.estimates import ABSOLUTE, BudgetQuantity
 from dbbstation.circles.path import Filter
-from dbbstation.circles.quick_look import quick_look
-from dbbstation.circles.signatures import Signature
+from dbbstation.circles.quick_look import Signature, quick_look
 from dbbstation.plan.bar import Bar
 from dbbstation.plan.plan import Circle, Direction
 from dbbstation.plan.tolerance import CircleFigure

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING
 from dbbstation.computing.arrays import norm_of
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.quality.all_runs import AllForms, bar_of_all, programs_of_all
-from dbbstation.quality.between import direction, other_direction, repeat
+from dbbstation.quality.between import direction, local_difference, locally_apart_um, other_direction, repeat
 from dbbstation.quality.copied import copied
 from dbbstation.quality.finding import Finding, Name, stricter
 from dbbstation.quality.knowledge import Others, Run, Seen, across, apart_um, seen
-from dbbstation.quality.local import local_difference, locally_apart_um
 from dbbstation.quality.place import bore, form, radius
-from dbbstation.quality.scale import scale
-from dbbstation.quality.single import by_itself
+from dbbstation.quality.single import by_itself, scale
 from dbbstation.quality.stated import sigmas_apart
 from dbbstation.quality.swapped import of_its_test
 from dbbstation.quality.together import expected_beside, together

@@ -12,7 +12,6 @@ from dbbstation.facts.serialise import as_objects
 from dbbstation.machine.geometry import differences, in_words
 from dbbstation.report.certificate import certified
 from dbbstation.report.conditions import conditions, identity, when_measured
-from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, Polar, cured_polars, polar
 from dbbstation.results.circles import RunWithoutCircle, circles_result, not_stated, why_not
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
@@ -32,12 +31,13 @@ from dbbstation.sources.contract import Owner
 from dbbstation.text.written import to_its_place
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable, Mapping
 
     from dbbstation.circles.path import Filter
     from dbbstation.files.formats.settings import Settings
     from dbbstation.files.provenance import Provenance
     from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.plan.plan import PlannedTest
     from dbbstation.report.certificate import Certified
     from dbbstation.results.calibration import EvaluationResult
     from dbbstation.results.circles import Circled, CirclesResult
@@ -173,7 +173,7 @@ def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance
         "job": reported.job or found.sessions[0].job,
         "sessions": list(_sessions(reported, bad)),
         "reasons_shown": REASONS_SHOWN,
-        "map_width": WIDTH,
+        "map_width": MAP_WIDTH,
         "polar_size": SIZE,
         "polar_radius": CIRCLE,
         "polars": _polars(reported),
@@ -286,3 +286,42 @@ def _files(reported: Reported, provenance: Provenance) -> Iterable[tuple[str, st
             if one.entry.program is not None:
                 program = one.entry.program
                 yield f"{one.session}/{program.path.parent.name}/{program.path.name}", program.sha256
+
+
+MAP_WIDTH = 420
+"""Width and height of the map in drawing units."""
+
+_MAP_MARGIN = 70.0
+
+_SAME_MM = 1.0
+"""Largest distance of balls at one position, such as holders of several heights in one bore."""
+
+
+def plate_map(tests: Mapping[str, PlannedTest], marked: Collection[str]) -> tuple[Mapping[str, object], ...]:
+    """Return places of tests; +X is right, +Y up."""
+    at: dict[tuple[int, int], list[PlannedTest]] = {}
+    for test in tests.values():
+        x, y, _ = test.ball.centre_mm
+        at.setdefault((round(x / _SAME_MM), round(y / _SAME_MM)), []).append(test)
+    xs, ys = [x for x, _ in at], [y for _, y in at]
+    width_mm = max(max(xs) - min(xs), max(ys) - min(ys), 1) * _SAME_MM
+    scale = (MAP_WIDTH - 2.0 * _MAP_MARGIN) / width_mm
+    middle = _SAME_MM * (max(xs) + min(xs)) / 2.0, _SAME_MM * (max(ys) + min(ys)) / 2.0
+    return tuple(
+        {
+            "x": round(MAP_WIDTH / 2.0 + scale * (_SAME_MM * x - middle[0]), 1),
+            "y": round(MAP_WIDTH / 2.0 - scale * (_SAME_MM * y - middle[1]), 1),
+            "label": _label_of(there),
+            "tests": " ".join(test.name for test in there),
+            "marked": any(test.name in marked for test in there),
+        }
+        for (x, y), there in at.items()
+    )
+
+
+def _label_of(there: list[PlannedTest]) -> str:
+    bores = list(dict.fromkeys(test.ball.bore for test in there if test.ball.bore is not None))
+    if bores:
+        return f"bore {', '.join(map(str, bores))}"
+    x, y, _ = there[0].ball.centre_mm
+    return f"X {x:.0f} Y {y:.0f}"

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.circles.analysis import analyse
-from dbbstation.circles.quick_look import _turn, quick_look
-from dbbstation.circles.signatures import ENDS, Signature, SignatureColumn, shapes_of
+from dbbstation.circles.quick_look import ENDS, Signature, SignatureColumn, _turn, quick_look, shapes_of
 from dbbstation.trace.recording import RawCircle
 from tests.circles.test_analysis import CCW, CW, PHI
 

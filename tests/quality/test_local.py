@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from dbbstation.plan.plan import Direction
+from dbbstation.quality.between import local_difference
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import Others, local_columns, seen
-from dbbstation.quality.local import local_difference
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.servo import ServoLag

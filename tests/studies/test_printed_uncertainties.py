@@ -12,7 +12,7 @@ import dbbstation
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES
 from dbbstation.circles.budget import OF_BOTH, OF_ONE, RANGES
 from dbbstation.circles.estimates import BudgetQuantity
-from dbbstation.circles.signatures import Signature
+from dbbstation.circles.quick_look import Signature
 from dbbstation.plan.tolerance import CircleFigure
 from studies import coverage_calibration, coverage_feed
 from studies.coverage_circles import CELLS, GAUSSIAN, SHARP, _drawn

@@ -78,6 +78,8 @@ NO_FIGURE = {
     "effects.CauseEffect.g_u_um": "of a cause that was named: the studies of hidden effects count those",
     "effects.CauseEffect.centre_u_um": "as above",
     "effects.CauseEffect.workspace_u_um": "as above",
+    "effects.WorkspaceError.uncertainty_rms_um": "of `diagnose`: the rms of the uncertainties that the rows of `predict` count",
+    "effects.WorkspaceError.uncertainty_with_shift_rms_um": "as above",
 }
 """Why a field has no row."""
 

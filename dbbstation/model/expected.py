@@ -63,6 +63,7 @@ def expected_circle(
     moves = [fit @ cause.columns_mm for cause in acting if cause.at_a_pose]
     again = [cause.scatters * effect @ effect.T for cause, effect in zip(acting, effects, strict=True)]
     covariance = sum((move @ move.T for move in moves), np.zeros((3, 3)))
+    nothing = np.zeros((COEFFICIENTS, COEFFICIENTS))
     # A raised bar measures cos e times a horizontal shift.
     along = sparse.raw.circle.radius_mm / sparse.raw.circle.bar_mm
     scale = np.diag([1.0 / along, 1.0 / along, 1.0])
@@ -78,7 +79,8 @@ def expected_circle(
         effects_um={cause.key: effect for cause, effect in zip(acting, effects, strict=True)},
         local_um=dict(local),
         moving=frozenset(cause.key for cause in acting if cause.moving),
-        again_um2=sum(again, np.zeros((COEFFICIENTS, COEFFICIENTS))),
+        again_um2=sum(again, nothing),
+        late_um2=sum((effect @ effect.T for cause, effect in zip(acting, effects, strict=True) if cause.late), nothing),
         place_um=1e3 * hypot_of(mounting_mm, observation.setup.ball_uncertainty_mm),
     )
 
@@ -92,6 +94,7 @@ class _Acting:
         columns_mm: change of the reading by one standard deviation of each parameter, shape (n, p).
         at_a_pose: whether it depends on the pose alone.
         scatters: number of its variances in the difference of two runs: two if it varies with the mounting, one if it varies with time.
+        late: whether it varies with time.
     """
 
     key: tuple[str, str]
@@ -99,6 +102,7 @@ class _Acting:
     at_a_pose: bool
     scatters: float = 0.0
     moving: bool = False
+    late: bool = False
 
 
 def _acting(
@@ -137,9 +141,11 @@ def _acting(
         except ModelError:
             continue  # the machine file lacks an input of this cause
         if np.all(np.isfinite(columns)):
-            scatters = 2.0 if source.belongs_to is Owner.MOUNTING else float(source.varies_with == "time")
+            late = source.varies_with == "time"
+            scatters = 2.0 if source.belongs_to is Owner.MOUNTING else float(late)
             key = source.name, source.shared_by(motion)
-            yield _Acting(key, columns, at_a_pose=at_a_pose, scatters=scatters, moving=Need.PATH in source.needs)
+            moving = Need.PATH in source.needs
+            yield _Acting(key, columns, at_a_pose=at_a_pose, scatters=scatters, moving=moving, late=late)
 
 
 def _as_circle(motion: Motion) -> tuple[Floats, Floats, Floats]:

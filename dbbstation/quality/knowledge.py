@@ -78,6 +78,7 @@ class Expected:
         local_um: the same for causes that depend on path or time, in `local_columns`, shape (59, p) each.
         moving: keys of causes that act only in motion.
         again_um2: covariance of the difference of two remounted runs, shape (7, 7).
+        late_um2: part of it by causes that vary with time, at the run's time, shape (7, 7).
         place_um: stated standard deviation of the ball's place, CMM and holder, per axis.
         known_um2: covariance of a sound form with noise, given other tests, shape (7, 7); None without other tests.
     """
@@ -93,6 +94,7 @@ class Expected:
     local_um: Mapping[tuple[str, str], Floats] = field(default_factory=dict)
     moving: frozenset[tuple[str, str]] = frozenset()
     again_um2: Floats = field(default_factory=lambda: np.zeros((COEFFICIENTS, COEFFICIENTS)))
+    late_um2: Floats = field(default_factory=lambda: np.zeros((COEFFICIENTS, COEFFICIENTS)))
     place_um: float = 0.0
     known_um2: Floats | None = None
 

@@ -44,7 +44,7 @@ class PlanEffects:
     def run(self, one: Seen) -> RunEffects:
         """Return a run compared with each circle, cached."""
         if one not in self._runs:
-            self._runs[one] = RunEffects(self, one)
+            self._runs[one] = RunEffects(self, one, _late_um2(one, [*self._runs, one]))
         return self._runs[one]
 
     @cached_property
@@ -116,12 +116,16 @@ class PlanEffects:
 class RunEffects:
     """A run compared with each circle of the plan, and with none of them.
 
+    Args:
+        late_um2: variance of each coefficient by what changed since the session began.
+
     Attributes:
         planned: label of the circle under which the run was filed.
     """
 
-    def __init__(self, plan: PlanEffects, one: Seen) -> None:
+    def __init__(self, plan: PlanEffects, one: Seen, late_um2: float) -> None:
         self._plan, self._one = plan, one
+        self._noise_um2 = one.u_um**2 + late_um2
         self.planned = plan.labels[one.run.test, one.run.circle.direction]
         self._products: dict[int, Floats] = {}
 
@@ -151,7 +155,7 @@ class RunEffects:
     def scatter(self) -> Floats:
         """Return the covariance of the reading's own part by label, shape (l + 3, 7, 7) [µm²]."""
         own = self._plan.own
-        by_label = np.array([*own, *[own[self.planned]] * 3]) + self._one.u_um**2 * np.eye(COEFFICIENTS)
+        by_label = np.array([*own, *[own[self.planned]] * 3]) + self._noise_um2 * np.eye(COEFFICIENTS)
         by_label[ELSEWHERE] = ELSEWHERE_UM**2 * np.eye(COEFFICIENTS)
         for k in (FIRST_COSINE, FIRST_SINE):
             by_label[BESIDE, k, k] += ELSEWHERE_UM**2
@@ -162,6 +166,16 @@ class RunEffects:
     def half_log_determinants(self) -> Floats:
         """Return half the log determinants of `scatter`, shape (l + 3,)."""
         return log_diagonal(np.linalg.cholesky(self.scatter))
+
+
+def _late_um2(one: Seen, known: Sequence[Seen]) -> float:
+    """Return the variance of a run's coefficients since the session began, as if it were the same in all.
+
+    Causes that vary with time have their usual size. The reading may have drifted as fast as overlaps of known runs show.
+    """
+    usual = 0.0 if one.run.expected is None else float(np.linalg.eigvalsh(one.run.expected.late_um2)[-1])
+    rate2 = float(np.mean([each.drift_um_s**2 for each in known]))
+    return usual + rate2 * (one.run.started_s or 0.0) ** 2
 
 
 def log_diagonal(roots: NDArray[np.floating]) -> Floats:

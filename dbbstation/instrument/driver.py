@@ -33,31 +33,6 @@ if TYPE_CHECKING:
     from dbbstation.instrument.reading import Reading
 
 
-class Arrivals:
-    """Remembers the times of received bytes for the length of a frame."""
-
-    def __init__(self, character_s: float, reach: int) -> None:
-        self._character_s = character_s
-        self._reach = reach
-        self._count = 0
-        self._chunks: deque[tuple[int, float]] = deque()
-
-    def note(self, size: int, seen_s: float) -> None:
-        """Note bytes seen together."""
-        if size <= 0:
-            return
-        self._count += size
-        self._chunks.append((self._count, seen_s))
-        while len(self._chunks) > 1 and self._chunks[0][0] < self._count - self._reach:
-            self._chunks.popleft()
-
-    def at_latest_s(self, behind: int) -> float:
-        """Return the latest possible arrival time of a byte [s], from the number of bytes after it."""
-        place = self._count - behind
-        end, seen_s = next(one for one in self._chunks if one[0] >= place)
-        return seen_s - (end - place) * self._character_s
-
-
 class Listener:
     """Reads a streaming instrument until stopped; only a long silence is an error."""
 
@@ -65,7 +40,7 @@ class Listener:
         protocol = reception.protocol
         self._link = link
         self._to = reception
-        self._sequence = SampleOrder[tuple[Piece, float, float]](protocol.counter_modulus, reception.where)
+        self._sequence = SampleOrder[tuple[Piece, float]](protocol.counter_modulus, reception.where)
         # Behind the answer to a start command the stream begins with a whole frame.
         self._decoder = Decoder(protocol, joining=not (protocol.ask.start and protocol.ask.start[-1].reply))
         self._stamps = (
@@ -74,7 +49,6 @@ class Listener:
             else StreamStamps(1.0 / protocol.fastest_hz(reception.baud), reception.memory_s)
         )
         self._doubts = Doubts(protocol)
-        self._arrivals = Arrivals(reception.character_s, 2 * LONGEST_LINE)
         self._good_s = time.monotonic()
         self._garbled, self._unread, self._why = 0, b"", ""
 
@@ -87,7 +61,6 @@ class Listener:
         while not self._to.stop.is_set():
             chunk += self._link.read()
             seen_s = self._to.clock()
-            self._arrivals.note(len(chunk), seen_s)
             for heard in self._decoder.feed(chunk) if chunk else ():
                 if isinstance(heard, Garbage):
                     self._pass_over(heard)
@@ -109,15 +82,14 @@ class Listener:
         left_s = seen_s - size * self._to.character_s - self._to.protocol.timing.latch_delay_s
         judged = self._doubts.judged(heard)
         heard = heard if judged is heard.reading else replace(heard, reading=judged)
-        sample = (heard, left_s, self._arrivals.at_latest_s(size - 1))
-        for placed in self._sequence.place(heard.reading.counter, sample):
-            piece, sent_s, first_s = placed.sample
+        for placed in self._sequence.place(heard.reading.counter, (heard, left_s)):
+            piece, sent_s = placed.sample
             if placed.lost is None:
                 self._to.tally.reject(piece.raw, "counter")
                 self._unread, self._why = (self._unread + piece.raw)[:LONGEST_LINE], placed.why
                 continue
             lost = placed.lost if self._sequence.counts else self._garbled
-            self._to.put(replace(piece.reading, t_s=self._stamps.stamp(sent_s, lost), lost=lost, first_byte_s=first_s))
+            self._to.put(replace(piece.reading, t_s=self._stamps.stamp(sent_s, lost), lost=lost))
             self._good_s = time.monotonic()
             self._garbled, self._unread, self._why = 0, b"", ""
 

@@ -136,7 +136,7 @@ class Poller:
     def _take(self, heard: Piece, first_s: float, asked_s: float) -> None:
         latch = latch_of(self._protocol, asked_s=asked_s, first_byte_s=first_s, baud=self._to.baud)
         self._last_s = max(latch.t_s, self._last_s + 1e-6)
-        reading = replace(heard.reading, t_s=self._last_s, t_uncertainty_s=latch.uncertainty_s, first_byte_s=first_s)
+        reading = replace(heard.reading, t_s=self._last_s, t_uncertainty_s=latch.uncertainty_s)
         if reading.status == "fault":
             # Asked once: while the fault lasts the words stay the same.
             self._explained = self._explained or self._explanation() or reading.said

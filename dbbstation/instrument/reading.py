@@ -30,7 +30,6 @@ class Reading:
         counter: of the device, or None.
         said: the device's words, or the reason for doubt; if not `ok`.
         t_uncertainty_s: standard, bounded by the request; None for a stream.
-        first_byte_s: latest arrival of the first byte, by the same clock; 0 without.
     """
 
     t_s: float
@@ -41,7 +40,6 @@ class Reading:
     said: str = ""
     remedy: str = ""
     t_uncertainty_s: float | None = None
-    first_byte_s: float = 0.0
 
     @property
     def gone(self) -> bool:

@@ -1,14 +1,13 @@
-"""The moment of a length that was asked for, and its uncertainty; and when the first byte of a sample came."""
+"""The moment of a length that was asked for, and its uncertainty."""
 
 from __future__ import annotations
 
 from math import sqrt
-from statistics import median
 
 import numpy as np
 import pytest
 
-from dbbstation.instrument.driver import Arrivals, Instrument
+from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import load_instrument
 from dbbstation.instrument.polling import latch_of
 from dbbstation.virtual.wire import VirtualInstrument
@@ -69,35 +68,3 @@ def test_the_uncertainty_holds_what_the_virtual_gauge_does() -> None:
     assert np.all(stated_s > 0.02)
     assert np.all(np.abs(off_s) < 0.6 * sqrt(12) * stated_s)
     assert np.mean((off_s / stated_s) ** 2) < 1.0 + 4.0 * sqrt(4 / 5 / 40)
-    assert all(one.first_byte_s > one.t_s for one in readings)
-
-
-def test_bytes_seen_together_came_one_after_the_other() -> None:
-    arrivals = Arrivals(0.001, reach=100)
-    arrivals.note(10, 1.0)
-    arrivals.note(5, 2.0)
-    assert arrivals.at_latest_s(0) == 2.0
-    assert arrivals.at_latest_s(4) == pytest.approx(1.996)
-    assert arrivals.at_latest_s(5) == 1.0
-    assert arrivals.at_latest_s(14) == pytest.approx(0.991)
-
-
-def test_arrivals_forget_what_no_frame_reaches() -> None:
-    arrivals = Arrivals(0.0, reach=50)
-    for place in range(10_000):
-        arrivals.note(1, float(place))
-    assert len(arrivals._chunks) <= 52
-
-
-def test_the_first_byte_of_a_sample_of_a_stream_lies_before_it_was_seen_whole() -> None:
-    protocol = load_instrument("streaming-encoder")
-    with VirtualInstrument(protocol, lambda _: 150.0) as virtual, Instrument(protocol, virtual.port) as instrument:
-        readings = list(instrument.readings(50))
-    length_s = protocol.frame_characters * 10 / 115_200
-    # From one sample to the next it may jump where the computer was busy; over all of them it is the device's period.
-    assert (readings[-1].first_byte_s - readings[0].first_byte_s) / 49 == pytest.approx(0.004, rel=0.25)
-    # The device's clock is read off what arrives: where the computer held up the first samples, some are stamped by as much too late.
-    behind_s = [one.first_byte_s - one.t_s for one in readings]
-    assert max(map(abs, behind_s)) < 0.2
-    assert -length_s < median(behind_s) < 0.2
-    assert {one.t_uncertainty_s for one in readings} == {None}

@@ -146,7 +146,6 @@ def run(
     *,
     mm_s2: float = 1000.0,
     faster: int = 1,
-    patience_s: float = PATIENCE_S,
     kins: ControlKins | None = None,
 ) -> PlannerRun:
     """Run a program on the planner, from its first point.
@@ -162,18 +161,16 @@ def run(
     """
     while True:
         try:
-            return run_once(text, mm_s2, faster, patience_s, kins)
+            return run_once(text, mm_s2, faster, kins)
         except BehindError:
             if faster == 1:
                 raise
             faster = max(faster // 2, 1)
 
 
-def run_once(
-    text: str, mm_s2: float, faster: int, patience_s: float = PATIENCE_S, kins: ControlKins | None = None
-) -> PlannerRun:
+def run_once(text: str, mm_s2: float, faster: int, kins: ControlKins | None = None) -> PlannerRun:
     """Run a program with this clock; arguments as for `run`."""
-    with started(text, mm_s2, faster, kins, patience_s=patience_s) as (folder, printed):
+    with started(text, mm_s2, faster, kins) as (folder, printed):
         ended = text_of(folder / "ended.txt") if (folder / "ended.txt").exists() else ""
         if ended == BEHIND:
             raise BehindError(BEHIND)
@@ -186,7 +183,7 @@ def run_once(
 
 @contextmanager
 def started(
-    text: str, mm_s2: float, faster: int, kins: ControlKins | None, *, patience_s: float, driver: Path | None = None
+    text: str, mm_s2: float, faster: int, kins: ControlKins | None, *, driver: Path | None = None
 ) -> Iterator[tuple[Path, str]]:
     """Run LinuxCNC to its end in a new folder; yield the folder and the printed text.
 
@@ -201,7 +198,7 @@ def started(
         (folder / "drive.py").chmod(0o755)
         (folder / "program.ngc").write_text(_quickened(text, faster), encoding="utf-8")
         (folder / "start.txt").write_text(_first_point(text), encoding="utf-8")
-        yield folder, _printed(folder, patience_s)
+        yield folder, _printed(folder)
 
 
 def driven_program(machine: Machine, ran: PlannerRun) -> str:
@@ -301,7 +298,7 @@ def alone() -> Iterator[None]:
         os.close(handle)
 
 
-def _printed(folder: Path, patience_s: float) -> str:
+def _printed(folder: Path) -> str:
     command: Sequence[str] = ["linuxcnc", "-r", "planner.ini"]
     if is_root():
         user, group = (os.environ.get(name, NOBODY) for name in ("SUDO_UID", "SUDO_GID"))
@@ -319,7 +316,7 @@ def _printed(folder: Path, patience_s: float) -> str:
         start_new_session=True,
     )
     try:
-        printed, _ = running.communicate(timeout=patience_s)
+        printed, _ = running.communicate(timeout=PATIENCE_S)
     except BaseException:
         end_tree(running)
         # What LinuxCNC started as daemons ends by its own means.

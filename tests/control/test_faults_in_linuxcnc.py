@@ -16,7 +16,7 @@ from dbbstation.files.places import package_text
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
-from dbbstation.virtual.linuxcnc import PATIENCE_S, installed_component, missing, started
+from dbbstation.virtual.linuxcnc import installed_component, missing, started
 from tests.control.in_linuxcnc import NAME
 from tests.control.machines import THERMOMETERS, machine
 from tests.control.test_parameters import truth_of
@@ -45,7 +45,7 @@ def told(model: MachineModel, steps: list[str], folder: Path) -> tuple[list[dict
     text = "\n".join([START, f"G1 F{FEED} X1", *steps])
     with (
         installed_component(folder / f"{NAME}.comp"),
-        started(text, 1000.0, 1, kins, patience_s=PATIENCE_S, driver=DRIVER) as (ran, printed),
+        started(text, 1000.0, 1, kins, driver=DRIVER) as (ran, printed),
     ):
         assert (ran / "told.json").exists(), printed
         found = json.loads((ran / "told.json").read_text())

@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 
 from dbbstation.calibration.fit.calibrate import calibrate
-from dbbstation.diagnosis.drawn import gains_by_test, source_curves
+from dbbstation.diagnosis.source_curves import gains_by_test, source_curves
 from dbbstation.report.calibration_figure import calibration_figure
 from dbbstation.report.diagnosis_figure import diagnosis_figure
 from dbbstation.tasks.load import load_sessions

@@ -110,7 +110,7 @@ SEARCHED = (
     Constant("inference.coloured", "SHORTEST_OF_ALL"),
     Constant("inference.looks", "NEIGHBOUR", (0.4, 0.85)),
     Constant("inference.model_comparison", "MOST_SLACK"),
-    Constant("inference.patterns", "CURVES"),
+    Constant("inference.patterns", "CURVES", (5, 14)),
     Constant("inference.patterns", "DISTINCT"),
     Constant("inference.patterns", "WALK_STEPS"),
     Constant("inference.patterns", "WAVE_SHARE"),

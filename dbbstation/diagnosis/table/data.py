@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 REFITTED = 2.0
 """Prior standard deviation of a free parameter's effect, over the rms error as simulated. Half or double changes no
-verdict of three tables [docs/mismatch.md]."""
+verdict of three tables; of a fourth, half puts one parameter beyond its stated value [docs/validation.md]."""
 
 OFFSET = "offset"
 """Name of the constant base column."""

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, cast
 
 from benchmarks.measuring import Row, show  # isort: skip - sets up the environment
 
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.station.events import RunAccepted, RunId
 from dbbstation.station.judging import RunJudge
@@ -38,7 +39,8 @@ WANTED = 2.2
 
 def cost_s(session: SessionFolder) -> list[float]:
     """Return what each verdict costs: its circle analysed, and judged beside those before it [s]."""
-    judge, costs = RunJudge(cast("SessionWriter", SimpleNamespace(session=session, runs=()))), []
+    begun = [replace(entry, state=RunState.RECORDING) for entry in session.runs]
+    judge, costs = RunJudge(cast("SessionWriter", SimpleNamespace(session=session, runs=begun))), []
     for entry in session.runs:
         recording, run = (
             session.load(entry).recording,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
 import pytest
 
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.quality.finding import FindingVerdict
 from dbbstation.station.events import RunAccepted, RunId
@@ -20,14 +22,15 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.session_writer import SessionWriter
 
 
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_wandering_bar_makes_no_right_circle_wrong(tmp_path, seed: int) -> None:
     """Its random walk leaves 0.4 µm a circle and 2 µm a session, some forty times the noise of a mean reading."""
     mechanisms = [RandomKinematics(), WanderingBar(step_um_root_s=0.05)]
     plan = subset(table_ii_plan(seed), "abdfhjkn")
     record(tmp_path / "session", seed=seed, plan=plan, rate_hz=25.0, mechanisms=mechanisms)
     session = read_session(tmp_path / "session")
-    judge = RunJudge(cast("SessionWriter", SimpleNamespace(session=session, runs=())))
+    begun = [replace(entry, state=RunState.RECORDING) for entry in session.runs]
+    judge = RunJudge(cast("SessionWriter", SimpleNamespace(session=session, runs=begun)))
     for entry in session.runs:
         run = RunId(entry.test, entry.direction, entry.repeat, entry.mounting or 0)
         findings = judge.judge(run, session.load(entry).recording)

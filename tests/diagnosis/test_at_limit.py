@@ -177,7 +177,7 @@ def test_who_interrupts_the_comparison_gets_what_it_had_found(backlash, monkeypa
         return search(comparison, causes, seeds, **options)
 
     monkeypatch.setattr(explain, "search", interrupted)
-    found = diagnose([backlash], sources=FEW, tests=EIGHT, until_interrupted=True)
+    found = diagnose([backlash], sources=FEW, tests=tuple(EIGHT), until_interrupted=True)
     assert found.limits[0].what == "stopped"
     assert found.held_out == "not-tested"
     (best,) = [source for source in found.sources if source.name == "backlash"]
@@ -207,7 +207,7 @@ def test_who_interrupts_the_tests_of_an_answer_gets_the_answer(backlash, found_b
 
     monkeypatch.setattr(finished, "explain", found_before)
     monkeypatch.setattr(finished, stage, interrupted)
-    found = diagnose([backlash], sources=FEW, tests=EIGHT, until_interrupted=True)
+    found = diagnose([backlash], sources=FEW, tests=tuple(EIGHT), until_interrupted=True)
     assert found.limits[0].what == "stopped"
     (best,) = [source for source in found.sources if source.name == "backlash"]
     assert best.probability > 0.95
@@ -223,7 +223,7 @@ def test_who_interrupts_before_anything_is_found_gets_nothing(backlash, monkeypa
 
     monkeypatch.setattr(explain, "search", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        diagnose([backlash], sources=FEW, tests=EIGHT, until_interrupted=True)
+        diagnose([backlash], sources=FEW, tests=tuple(EIGHT), until_interrupted=True)
 
 
 @pytest.mark.slow

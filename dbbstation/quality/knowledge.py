@@ -78,7 +78,7 @@ class Expected:
         local_um: the same for causes that depend on path or time, in `local_columns`, shape (59, p) each.
         moving: keys of causes that act only in motion.
         again_um2: covariance of the difference of two remounted runs, shape (7, 7).
-        late_um2: part of it by causes that vary with time, at the run's time, shape (7, 7).
+        late_um2: covariance by causes that vary with time, at the run's time, shape (7, 7).
         place_um: stated standard deviation of the ball's place, CMM and holder, per axis.
         known_um2: covariance of a sound form with noise, given other tests, shape (7, 7); None without other tests.
     """

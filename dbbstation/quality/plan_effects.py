@@ -44,7 +44,9 @@ class PlanEffects:
     def run(self, one: Seen) -> RunEffects:
         """Return a run compared with each circle, cached."""
         if one not in self._runs:
-            self._runs[one] = RunEffects(self, one, _late_um2(one, [*self._runs, one]))
+            planned = self.labels[one.run.test, one.run.circle.direction]
+            late_um2 = _late_um2(one, self.circles[planned], [*self._runs, one])
+            self._runs[one] = RunEffects(self, one, planned, late_um2)
         return self._runs[one]
 
     @cached_property
@@ -117,16 +119,15 @@ class RunEffects:
     """A run compared with each circle of the plan, and with none of them.
 
     Args:
+        planned: label of the circle under which the run was filed.
         late_um2: variance of each coefficient by what changed since the session began.
 
-    Attributes:
-        planned: label of the circle under which the run was filed.
     """
 
-    def __init__(self, plan: PlanEffects, one: Seen, late_um2: float) -> None:
+    def __init__(self, plan: PlanEffects, one: Seen, planned: int, late_um2: float) -> None:
         self._plan, self._one = plan, one
         self._noise_um2 = one.u_um**2 + late_um2
-        self.planned = plan.labels[one.run.test, one.run.circle.direction]
+        self.planned = planned
         self._products: dict[int, Floats] = {}
 
     def shows(self, labels: ArrayLike) -> Integers:
@@ -168,12 +169,16 @@ class RunEffects:
         return log_diagonal(np.linalg.cholesky(self.scatter))
 
 
-def _late_um2(one: Seen, known: Sequence[Seen]) -> float:
+def _late_um2(one: Seen, begun: Planned, known: Sequence[Seen]) -> float:
     """Return the variance of a run's coefficients since the session began, as if it were the same in all.
 
     Causes that vary with time have their usual size. The reading may have drifted as fast as overlaps of known runs show.
+
+    Args:
+        begun: the run's circle as it would be at the session's begin.
     """
-    usual = 0.0 if one.run.expected is None else float(np.linalg.eigvalsh(one.run.expected.late_um2)[-1])
+    late_um2 = begun.expected.late_um2 if one.run.expected is None else one.run.expected.late_um2
+    usual = max(float(np.linalg.eigvalsh(late_um2 - begun.expected.late_um2)[-1]), 0.0)
     rate2 = float(np.mean([each.drift_um_s**2 for each in known]))
     return usual + rate2 * (one.run.started_s or 0.0) ** 2
 

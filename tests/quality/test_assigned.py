@@ -216,7 +216,7 @@ def test_the_cholesky_score_is_the_normal_density(sitting) -> None:
         whole = size**2 * machine @ machine.T + session @ session.T
         for k, one in enumerate(assigned.runs):
             rows = slice(7 * k, 7 * k + 7)
-            whole[rows, rows] += assigned.effects[0].own[labels[k]] + noise_um2(one) * np.eye(7)
+            whole[rows, rows] += assigned.effects[0].own[labels[k]] + one.u_um**2 * np.eye(7)
         logs.append(multivariate_normal(np.zeros(len(off)), whole, allow_singular=True).logpdf(off))
     wanted = logsumexp(logs) - np.log(len(SIZES)) + 0.5 * len(off) * np.log(2.0 * np.pi)
     assert assigned._looked_up.planned == pytest.approx(wanted, abs=1e-3)
@@ -282,7 +282,7 @@ def log_density(assigned: Assigned, labels: tuple[int, ...]) -> float:
             machine[k], session[k] = assigned.effects[0].of_machine[circle], assigned.effects[0].of_session[circle]
             more = {BESIDE: [0, 1, 0, 0, 1, 0, 0], LARGER: [1, 0, 0, 0, 0, 0, 0]}.get(label, [0] * 7)
             own[rows, rows] = (
-                assigned.effects[0].own[circle] + noise_um2(one) * np.eye(7) + ELSEWHERE_UM**2 * np.diag(more)
+                assigned.effects[0].own[circle] + one.u_um**2 * np.eye(7) + ELSEWHERE_UM**2 * np.diag(more)
             )
     machine, session, off = machine.reshape(7 * count, -1), session.reshape(7 * count, -1), off.ravel()
     logs = []
@@ -290,11 +290,6 @@ def log_density(assigned: Assigned, labels: tuple[int, ...]) -> float:
         whole = own + size**2 * machine @ machine.T + session @ session.T
         logs.append(-0.5 * (off @ np.linalg.solve(whole, off) + np.linalg.slogdet(whole)[1]))
     return float(np.logaddexp.reduce(logs) - np.log(len(SIZES)))
-
-
-def noise_um2(one: Seen) -> float:
-    """Variance by noise and by what changes with time; these runs have no start, so no drift beyond their turn."""
-    return one.u_um**2 + float(np.linalg.norm(one.run.expected.late_um2, 2))
 
 
 def read_um_expected(circle: Planned) -> np.ndarray:

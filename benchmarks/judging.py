@@ -39,8 +39,8 @@ WANTED = 2.2
 
 def cost_s(session: SessionFolder) -> list[float]:
     """Return what each verdict costs: its circle analysed, and judged beside those before it [s]."""
-    begun = [replace(entry, state=RunState.RECORDING) for entry in session.runs]
-    judge, costs = RunJudge(cast("SessionWriter", SimpleNamespace(session=session, runs=begun))), []
+    recording_now = [replace(entry, state=RunState.RECORDING) for entry in session.runs]
+    judge, costs = RunJudge(cast("SessionWriter", SimpleNamespace(session=session, runs=recording_now))), []
     for entry in session.runs:
         recording, run = (
             session.load(entry).recording,

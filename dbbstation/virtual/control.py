@@ -16,6 +16,7 @@ from dbbstation.plan.plan import Direction
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from io import BufferedIOBase
     from typing import Self
 
     from dbbstation.virtual.cell import VirtualCell
@@ -83,7 +84,7 @@ class _Line(StreamRequestHandler):
         """Answer until the client closes, or sends a line that does not end."""
         with suppress(OSError):
             while (line := self.rfile.readline(_LONGEST)).endswith(b"\n"):
-                self.wfile.write(self.server.answer(line))
+                self.server.answer(line, self.wfile)
 
 
 class ControlServer(ThreadingTCPServer):
@@ -103,9 +104,10 @@ class ControlServer(ThreadingTCPServer):
     def __exit__(self, *_: object) -> None:
         self.shutdown()
         self._thread.join()
-        for client in self._clients:
-            with suppress(OSError):  # it has gone
-                client.shutdown(socket.SHUT_RDWR)
+        with self._one_at_a_time:  # the answer to the last command is sent first
+            for client in self._clients:
+                with suppress(OSError):  # it has gone
+                    client.shutdown(socket.SHUT_RDWR)
         self.server_close()
 
     def get_request(self) -> tuple[socket.socket, object]:
@@ -114,14 +116,14 @@ class ControlServer(ThreadingTCPServer):
         self._clients = [one for one in self._clients if one.fileno() >= 0] + [client]
         return client, address
 
-    def answer(self, line: bytes) -> bytes:
-        """Return the answer to one command, a line of JSON."""
-        try:
-            with self._one_at_a_time:
+    def answer(self, line: bytes, client: BufferedIOBase) -> None:
+        """Execute one command, and send the answer, a line of JSON."""
+        with self._one_at_a_time:
+            try:
                 found = {"ok": True, **self._obey(line.decode("utf-8", "replace").strip())}
-        except StationError as error:
-            found = {"ok": False, "error": str(error)}
-        return json.dumps(found).encode() + b"\n"
+            except StationError as error:
+                found = {"ok": False, "error": str(error)}
+            client.write(json.dumps(found).encode() + b"\n")
 
 
 _PATIENCE_S = 30.0

@@ -42,7 +42,6 @@ TABLES = {
     "nc/dialects/poses.py": "writes numbers under the program's own names; its comments go through `plain`",
     "files/recordings/foreign_csv.py": "parts a line that it reads, and writes none",
     "simulators/program.py": "writes numbers for a program, which reads them as they are",
-    "tasks/fleet_work.py": "joins names of causes for an option",
 }
 """Files that write CSV themselves, each with its reason."""
 

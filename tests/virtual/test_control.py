@@ -3,7 +3,9 @@ from __future__ import annotations
 import json
 import socket
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from threading import Event
 from typing import TYPE_CHECKING
 
 import pytest
@@ -118,3 +120,18 @@ def test_nobody_there_is_said(cell: VirtualCell) -> None:
         url = running.url
     with pytest.raises(MachineError, match="does not answer `status`"):
         ControlClient(url).ask("status")
+
+
+def test_the_last_command_is_answered_though_the_server_ends() -> None:
+    told = Event()
+
+    def obey(line: str) -> dict[str, object]:
+        told.set()
+        time.sleep(0.3)
+        return {"line": line}
+
+    with ThreadPoolExecutor(1) as pool:
+        with ControlServer(obey) as server:
+            asked = pool.submit(ControlClient(server.url).ask, "quit")
+            assert told.wait(5.0)
+        assert asked.result()["line"] == "quit"

@@ -235,7 +235,7 @@ async def still(make: Callable[[StationApp], RowScreen | None], size: tuple[int,
         if isinstance(screen, ResultsScreen):
             await pilot.press("down", "down", "down")
         if isinstance(screen, AcceptanceScreen) and screen._searching is not None:
-            screen._searching.wait()
+            screen._searching.result()
         for _ in range(4):
             await pilot.pause()
             app.look()

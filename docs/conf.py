@@ -37,7 +37,6 @@ myst_heading_anchors = 3
 default_role = "literal"  # single backticks in docstrings are names, as in Markdown
 autodoc_member_order = "bysource"
 autodoc_class_signature = "separated"
-autodoc_preserve_defaults = False
 autodoc_use_type_comments = False  # we write annotations; Sphinx would parse each function anew
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False

@@ -33,12 +33,12 @@ def pytest_sessionstart() -> None:
     """Let interrupts through: a shell starts programs in the background with them ignored, and programs under test inherit that."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    # Tests are collected in two thirds of the time while nobody searches the growing heap for rings.
+    # Without the garbage collector, collecting the tests takes two thirds of the time.
     gc.disable()
 
 
 def pytest_collection_finish() -> None:
-    """Keep what was collected out of the search for rings: half a second each time, a twentieth of all processor time."""
+    """Spare the garbage collector the collected tests; each pass over them takes half a second."""
     gc.collect()
     gc.freeze()
     gc.enable()

@@ -12,24 +12,21 @@ import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 from benchmarks.measuring import Row, show  # isort: skip - sets up the environment
 
-from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.station.events import RunAccepted, RunId
-from dbbstation.station.judging import RunJudge
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import table_ii_plan
 from tests.plant.session import record
+from tests.station.judged import judge_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.files.recordings.session import SessionFolder
-    from dbbstation.files.recordings.session_writer import SessionWriter
     from tests.plant.mechanisms.base import Mechanism
 
 SEED = 8
@@ -39,8 +36,7 @@ WANTED = 2.2
 
 def cost_s(session: SessionFolder) -> list[float]:
     """Return what each verdict costs: its circle analysed, and judged beside those before it [s]."""
-    recording_now = [replace(entry, state=RunState.RECORDING) for entry in session.runs]
-    judge, costs = RunJudge(cast("SessionWriter", SimpleNamespace(session=session, runs=recording_now))), []
+    judge, costs = judge_of(session), []
     for entry in session.runs:
         recording, run = (
             session.load(entry).recording,

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, cast
-
 import pytest
 
-from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.quality.finding import FindingVerdict
 from dbbstation.station.events import RunAccepted, RunId
-from dbbstation.station.judging import RunJudge
 from tests.plant.mechanisms.disturbances import WanderingBar
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
-
-if TYPE_CHECKING:
-    from dbbstation.files.recordings.session_writer import SessionWriter
+from tests.station.judged import judge_of
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -29,8 +21,7 @@ def test_a_wandering_bar_makes_no_right_circle_wrong(tmp_path, seed: int) -> Non
     plan = subset(table_ii_plan(seed), "abdfhjkn")
     record(tmp_path / "session", seed=seed, plan=plan, rate_hz=25.0, mechanisms=mechanisms)
     session = read_session(tmp_path / "session")
-    begun = [replace(entry, state=RunState.RECORDING) for entry in session.runs]
-    judge = RunJudge(cast("SessionWriter", SimpleNamespace(session=session, runs=begun)))
+    judge = judge_of(session)
     for entry in session.runs:
         run = RunId(entry.test, entry.direction, entry.repeat, entry.mounting or 0)
         findings = judge.judge(run, session.load(entry).recording)

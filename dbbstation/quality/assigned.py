@@ -37,7 +37,7 @@ MISTAKE = LOG_ODDS_LIMIT
 WIDE = 3
 """Number of assignments that the search extends at once."""
 
-AT_ONCE = 512
+AT_ONCE = 64
 """Number of assignments that are scored at once; it affects only the time."""
 
 

@@ -13,7 +13,7 @@ from dbbstation.circles.path import CirclePath, Filter, both, path_of
 from dbbstation.circles.reversals import AXES_DEG, closure_of, harmonics_of, step_at
 from dbbstation.computing.arrays import place_of_largest, range_of
 from dbbstation.computing.threads import with_one_thread
-from dbbstation.plan.plan import FULL_TURN_DEG
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.trace.analysis import figures, passes_of
 from dbbstation.trace.cut import edges_of, overlap_feed_under
 from dbbstation.trace.recording import lost_samples

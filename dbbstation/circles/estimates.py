@@ -23,7 +23,7 @@ from dbbstation.circles.path import path_of
 from dbbstation.circles.strip import strip_widths
 from dbbstation.computing.arrays import hypot_of
 from dbbstation.computing.kept import once_for_each
-from dbbstation.plan.plan import FULL_TURN_DEG
+from dbbstation.facts.quantities import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis

@@ -20,7 +20,7 @@ from scipy.special import chndtr, chndtrinc
 from dbbstation.circles.form import drawn_lines
 from dbbstation.computing.arrays import average_of, sum_of
 from dbbstation.computing.compiled import compiled
-from dbbstation.plan.plan import FULL_TURN_DEG
+from dbbstation.facts.quantities import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

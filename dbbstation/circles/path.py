@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.inference.harmonics import smooth
-from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.trace.analysis import BallPath, best_circle, horizontal_radius_mm, measured_path, path_about_ball
 from dbbstation.trace.gaussian import gaussian, transmission
 from dbbstation.trace.minimum_zone import MinimumZone, minimum_zone

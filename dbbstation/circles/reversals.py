@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.arrays import hypot_of, sum_of
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.inference.harmonics import amplitudes
-from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from dbbstation.circles.path import CirclePath

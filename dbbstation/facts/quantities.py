@@ -9,6 +9,12 @@ from pydantic import AfterValidator, Field, GetCoreSchemaHandler, GetJsonSchemaH
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+FULL_TURN_DEG = 360.0
+
+USUAL_STROKE_MM = 10.0
+"""Travel of a bar's gauge in each direction if neither instrument nor session states it [mm]. One bar measures circles
+of 150 and 144 mm radius, so it is at least 6; up to 50 still distinguishes bars of 100 and 150 mm."""
+
 _MISTAKEN: dict[str, tuple[tuple[str, float], ...]] = {
     "mm": (("m", 1e3), ("µm", 1e-3), ("inch", 25.4)),
     "µm": (("mm", 1e3), ("m", 1e6), ("nm", 1e-3)),

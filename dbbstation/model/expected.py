@@ -11,8 +11,8 @@ from dbbstation.computing.arrays import hypot_of
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS, Frames
 from dbbstation.model.identified import IdentifiedModel
-from dbbstation.quality.knowledge import COEFFICIENTS, HIGHER, Expected, form_columns, local_columns
 from dbbstation.sources.contract import Need, Owner
+from dbbstation.trace.expected import COEFFICIENTS, HIGHER, Expected, form_columns, local_columns
 from dbbstation.trace.recording import averaged
 
 if TYPE_CHECKING:

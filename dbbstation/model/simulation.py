@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.model.observation import LEAD_IN_STEP_DEG
-from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.sources.contract import Motion, Setup
 
 if TYPE_CHECKING:

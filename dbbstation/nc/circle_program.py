@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.nc.toolpath import IN_FORCE, RowKind, Toolpath, ToolpathBuilder
-from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.nc.registry import dialect_of_file
 from dbbstation.nc.toolpath import RowKind
-from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats

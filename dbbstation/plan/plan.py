@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import StationError
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.machine.travel import check_travel
 
 if TYPE_CHECKING:
@@ -16,13 +17,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-
-
-FULL_TURN_DEG = 360.0
-
-USUAL_STROKE_MM = 10.0
-"""Travel of a bar's gauge in each direction if neither instrument nor session states it [mm]. One bar measures circles
-of 150 and 144 mm radius, so it is at least 6; up to 50 still distinguishes bars of 100 and 150 mm."""
 
 
 class Direction(StrEnum):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.facts import of_facts
-from dbbstation.plan.plan import FULL_TURN_DEG
+from dbbstation.facts.quantities import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

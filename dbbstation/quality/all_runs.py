@@ -16,9 +16,9 @@ from scipy.special import logsumexp
 from dbbstation.computing.arrays import place_of_largest
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, undecided
 from dbbstation.quality.forms import Forms, form_of
-from dbbstation.quality.knowledge import COEFFICIENTS, HIGHEST_HARMONIC
 from dbbstation.quality.limits import length_quantile
 from dbbstation.quality.together import expected_um, read_um
+from dbbstation.trace.expected import COEFFICIENTS, HIGHEST_HARMONIC
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

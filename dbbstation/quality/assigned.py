@@ -18,11 +18,11 @@ import numpy as np
 from dbbstation.computing.arrays import norm_of
 from dbbstation.quality.beside import SIZES, NearAssignments, Readings, mean_of
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
-from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.limits import LOG_ODDS_LIMIT
 from dbbstation.quality.plan_effects import BESIDE, ELSEWHERE, LARGER, PlanEffects, key_of
 from dbbstation.quality.stated import limit_along
 from dbbstation.quality.together import expected_um, read_um
+from dbbstation.trace.expected import COEFFICIENTS, along_travel
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

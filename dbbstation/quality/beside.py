@@ -14,8 +14,8 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from dbbstation.quality.forms import SIZES as SHARES
-from dbbstation.quality.knowledge import COEFFICIENTS
 from dbbstation.quality.plan_effects import BESIDE, ELSEWHERE, LARGER, log_diagonal
+from dbbstation.trace.expected import COEFFICIENTS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,24 +9,16 @@ import numpy as np
 
 from dbbstation.computing.arrays import hypot_of, median_of, norm_of, place_of_largest
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
-from dbbstation.quality.knowledge import (
-    ACROSS,
-    COEFFICIENTS,
-    LOCAL_COEFFICIENTS,
-    LOCAL_HARMONIC,
-    Others,
-    Seen,
-    across,
-    local_columns,
-)
+from dbbstation.quality.knowledge import ACROSS, Others, Seen, across
 from dbbstation.quality.limits import FEWEST_OTHERS, SCATTERING, length_limit, length_quantile, median_length, quantile
 from dbbstation.quality.stated import apart_by, covariance_apart, drifted_um, limit_along, limit_of_length, unseen_um2
+from dbbstation.trace.expected import COEFFICIENTS, LOCAL_COEFFICIENTS, LOCAL_HARMONIC, local_columns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Flags, Floats
-    from dbbstation.quality.knowledge import Expected
+    from dbbstation.trace.expected import Expected
 
 
 def direction(one: Seen, others: Others, expected: Expected | None = None) -> Finding:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.arrays import place_of_largest
-from dbbstation.plan.plan import FULL_TURN_DEG
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.quality.finding import Finding, Name, found
 from dbbstation.quality.limits import ROBUST_SHARE, largest_of, scale_of
 from dbbstation.trace.gaussian import gaussian

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.quality.knowledge import COEFFICIENTS, HIGHEST_HARMONIC, along_travel
 from dbbstation.quality.stated import unseen_um2
+from dbbstation.trace.expected import COEFFICIENTS, HIGHEST_HARMONIC, along_travel
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -9,14 +9,15 @@ import numpy as np
 from dbbstation.computing.arrays import hypot_of, norm_of
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.forms import own_um2
-from dbbstation.quality.knowledge import HIGHER
 from dbbstation.quality.limits import quantile
 from dbbstation.quality.stated import limit_along
 from dbbstation.trace.cut import FEED_SIGMAS
+from dbbstation.trace.expected import HIGHER
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis
-    from dbbstation.quality.knowledge import Expected, Seen
+    from dbbstation.quality.knowledge import Seen
+    from dbbstation.trace.expected import Expected
 
 BY_OTHERS = " by the other tests"
 """Words in texts for an expectation from other tests of the session."""

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.quality.forms import FIRST_COSINE, FIRST_SINE
-from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.together import expected_um, read_um
+from dbbstation.trace.expected import COEFFICIENTS, along_travel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

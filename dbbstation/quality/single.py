@@ -13,10 +13,11 @@ from dbbstation.computing.arrays import average_of, hypot_of, median_of, sum_of
 from dbbstation.quality.bump import bump
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.held import ALL_EQUAL, SHORTEST_S, chance_equal, equal_readings, held, moving_noise
-from dbbstation.quality.knowledge import Others, due_s, form_columns
+from dbbstation.quality.knowledge import Others, due_s
 from dbbstation.quality.limits import FEWEST_OTHERS, SHARE, joined, quantile, scale_of
 from dbbstation.quality.spike import spike
 from dbbstation.trace.cut import FEED_SIGMAS, FEED_TOLERANCE, edges_of, feed_off
+from dbbstation.trace.expected import form_columns
 from dbbstation.trace.recording import AFTER_LOSS, share_lost
 
 if TYPE_CHECKING:
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 
     from dbbstation.circles.analysis import CircleAnalysis
     from dbbstation.computing.arrays import Floats
-    from dbbstation.quality.knowledge import Expected, Seen
+    from dbbstation.quality.knowledge import Seen
+    from dbbstation.trace.expected import Expected
     from dbbstation.trace.recording import RawCircle
 
 

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.quality.knowledge import Expected, Seen
+    from dbbstation.quality.knowledge import Seen
+    from dbbstation.trace.expected import Expected
 
     Effects: TypeAlias = Mapping[tuple[str, str], Floats]
 

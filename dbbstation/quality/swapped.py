@@ -15,18 +15,19 @@ from scipy.special import logsumexp
 
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.forms import SIZES
-from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN, length_quantile
 from dbbstation.quality.stated import drifted_um, unseen_um2
 from dbbstation.quality.together import expected_um, read_um
+from dbbstation.trace.expected import COEFFICIENTS, along_travel
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.plan.plan import Circle
-    from dbbstation.quality.knowledge import Expected, Seen
+    from dbbstation.quality.knowledge import Seen
     from dbbstation.quality.together import Together
+    from dbbstation.trace.expected import Expected
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from scipy.special import chdtrc, chdtri, logsumexp
 
 from dbbstation.computing.arrays import median_of, place_of_largest
 from dbbstation.quality.forms import FIRST_COSINE, FIRST_SINE
-from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.limits import FEWEST_OTHERS, SHARE, median_length
+from dbbstation.trace.expected import COEFFICIENTS, along_travel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.plan.plan import Circle
     from dbbstation.quality.forms import Forms, FormsBesides
-    from dbbstation.quality.knowledge import Expected, Planned, Run, Seen
+    from dbbstation.quality.knowledge import Planned, Run, Seen
+    from dbbstation.trace.expected import Expected
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,8 @@ from matplotlib.patches import Circle as Ring
 
 from dbbstation.circles.estimates import FIRST
 from dbbstation.computing.arrays import hypot_of, largest_size
-from dbbstation.plan.plan import FULL_TURN_DEG, Direction
+from dbbstation.facts.quantities import FULL_TURN_DEG
+from dbbstation.plan.plan import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, SET
 from dbbstation.report.polar import CIRCLE, REACH, SIZE, step_of, thinned
 from dbbstation.report.sheet import TEXT_PT, Box, line_in, place_labels, width_of_in, wrapped

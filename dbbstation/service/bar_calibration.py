@@ -11,10 +11,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from dbbstation.errors import InputError, InstrumentError, StationError
-from dbbstation.facts.quantities import Quantity
+from dbbstation.facts.quantities import USUAL_STROKE_MM, Quantity
 from dbbstation.files.formats.bar import AFTER_MISREAD, BarFile, CalibratorSchema, write_bar
 from dbbstation.plan.bar import STEEL_BAR_UM_M_K, USUAL_READINGS, USUAL_TEMP_UNCERTAINTY_K
-from dbbstation.plan.plan import USUAL_STROKE_MM
 from dbbstation.trace.reachable import Reachable
 from dbbstation.trace.steady import steady
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import TraceError
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.instrument.reading import DOUBTFUL, OK
-from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.quality.held import AFTER_HELD, SHORTEST_S, HeldLength
 from dbbstation.station.detector import DWELL_BEHIND_S, feed_out_due_s, live_phi_deg
 from dbbstation.station.events import Sample

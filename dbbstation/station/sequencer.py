@@ -7,8 +7,8 @@ from collections import deque
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.instrument.reading import DOUBTFUL, OK
-from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.plan.sampling import sampling
 from dbbstation.quality.finding import against_limit
 from dbbstation.quality.held import HeldLength

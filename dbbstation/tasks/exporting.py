@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dbbstation.errors import InputError, OutputError, TraceError, read_each
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.files.atomic import streamed, write_text
 from dbbstation.files.csv_rows import csv_text
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.provenance import beside_table
 from dbbstation.files.recordings.run_lines import split_head
-from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.trace import columns
 from dbbstation.trace.cut import edges_of, progress_deg
 

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from dbbstation.errors import TraceError
-from dbbstation.plan.plan import FULL_TURN_DEG
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.trace.cut import edges_of, progress_deg
 from dbbstation.trace.recording import CentredCircle, RawCircle
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.computing.kept import once_for_each
 from dbbstation.errors import TraceError
-from dbbstation.plan.plan import FULL_TURN_DEG, USUAL_STROKE_MM
+from dbbstation.facts.quantities import FULL_TURN_DEG, USUAL_STROKE_MM
 from dbbstation.trace.columns import each
 from dbbstation.trace.recording import AFTER_LOSS, RawCircle, lost_samples, means, share_lost
 

@@ -12,9 +12,9 @@ from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Observation
 from dbbstation.plan.plan import Circle, Direction
-from dbbstation.quality.knowledge import LOCAL_COEFFICIENTS
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Need, Owner, Parameter, Setup, Texts
 from dbbstation.sources.registry import known_sources
+from dbbstation.trace.expected import LOCAL_COEFFICIENTS
 from dbbstation.trace.recording import RawCircle
 
 KNOWN = known_sources()

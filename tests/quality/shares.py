@@ -9,7 +9,8 @@ import numpy as np
 
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.judge import Judgement, SessionRuns
-from dbbstation.quality.knowledge import HIGHEST_HARMONIC, Seen, seen
+from dbbstation.quality.knowledge import Seen, seen
+from dbbstation.trace.expected import HIGHEST_HARMONIC
 from dbbstation.trace.recording import Recording
 from tests.quality.sessions import Sound, finding_of
 from tests.quality.spoilers import SPOILERS, longer, mirrored, progress, quiet_deg

@@ -18,7 +18,8 @@ from dbbstation.quality.answer import Advice, answer
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.forms import SIZES
 from dbbstation.quality.judge import SessionRuns
-from dbbstation.quality.knowledge import COEFFICIENTS, Expected, Seen
+from dbbstation.quality.knowledge import Seen
+from dbbstation.trace.expected import COEFFICIENTS, Expected
 from dbbstation.trace.recording import Recording
 from tests.quality.sessions import Sound, finding_of, sound, spoilt
 from tests.quality.spoilers import elsewhere, larger, mirrored, turned

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from dbbstation.quality.forms import SIZES, Forms, RunForm
-from dbbstation.quality.knowledge import COEFFICIENTS
+from dbbstation.trace.expected import COEFFICIENTS
 
 N = COEFFICIENTS
 HELD = [(object(),) for _ in range(7)]

@@ -12,7 +12,8 @@ from dbbstation.plan.plan import Direction
 from dbbstation.quality.between import local_difference
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
-from dbbstation.quality.knowledge import Others, local_columns, seen
+from dbbstation.quality.knowledge import Others, seen
+from dbbstation.trace.expected import local_columns
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.servo import ServoLag

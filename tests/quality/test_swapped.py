@@ -9,8 +9,9 @@ import pytest
 
 from dbbstation.plan.plan import Circle, Direction
 from dbbstation.quality.finding import FindingVerdict
-from dbbstation.quality.knowledge import COEFFICIENTS, Expected, Planned
+from dbbstation.quality.knowledge import Planned
 from dbbstation.quality.swapped import of_its_test
+from dbbstation.trace.expected import COEFFICIENTS, Expected
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0.0, 45, 1.5, 0, Direction.CCW)
 APART_UM, KNOWN_UM = 100.0, 5.0

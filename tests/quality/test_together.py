@@ -13,8 +13,9 @@ from dbbstation.plan.plan import Circle, Direction
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.forms import Forms, form_of
 from dbbstation.quality.judge import SessionRuns
-from dbbstation.quality.knowledge import COEFFICIENTS, Expected, along_travel, seen
+from dbbstation.quality.knowledge import seen
 from dbbstation.quality.together import Together, expected_beside, together
+from dbbstation.trace.expected import COEFFICIENTS, Expected, along_travel
 from tests.quality.sessions import finding_of
 from tests.quality.spoilers import elsewhere, larger, mirrored
 

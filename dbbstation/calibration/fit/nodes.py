@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.arrays import norm_of
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.inference.square_root import compress
-from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers

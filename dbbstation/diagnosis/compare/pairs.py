@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import TraceError
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import bands, basis
 from dbbstation.inference.square_root import slices
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.trace.recording import averaged, means
 
 if TYPE_CHECKING:

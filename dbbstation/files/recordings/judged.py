@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import MachineError, TraceError
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.model.expected import SECTORS, expected_circle
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Observation
-from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.quality.judge import Judgement, judge
 from dbbstation.quality.knowledge import Planned, Run
 from dbbstation.sources.registry import known_sources
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.quality.knowledge import Expected
+    from dbbstation.trace.expected import Expected
     from dbbstation.trace.recording import Recording
 
 JUDGED = (RunState.ACCEPTED, RunState.COMPLETE)

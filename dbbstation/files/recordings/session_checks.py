@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
-from dbbstation.facts.quantities import twice
+from dbbstation.facts.quantities import USUAL_STROKE_MM, twice
 from dbbstation.files.formats.session import SessionFile, sealed_or_part
 from dbbstation.files.gateway import sha256_hex
 from dbbstation.files.recordings.run_csv import changed
 from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.schema import dotted, read_document, validate
-from dbbstation.plan.plan import USUAL_STROKE_MM
 from dbbstation.text.written import listed
 
 if TYPE_CHECKING:

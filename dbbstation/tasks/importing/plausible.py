@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.arrays import range_of, sum_of
+from dbbstation.facts.quantities import FULL_TURN_DEG, USUAL_STROKE_MM
 from dbbstation.files.formats.mapping import ANGLE, DEVIATION, LENGTH, TIME, UNITS
-from dbbstation.plan.plan import FULL_TURN_DEG, USUAL_STROKE_MM
 from dbbstation.tasks.importing.travel import UnusableTravelError
 from dbbstation.trace.cut import LARGEST_JUMP_MM
 

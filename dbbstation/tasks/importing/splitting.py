@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import MOST_FAULTS, Problem
+from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.files.formats.mapping import ANGLE, DEVIATION, LENGTH, TIME
 from dbbstation.files.recordings.table_csv import NO_NUMBER
 from dbbstation.files.source_text import shortened
-from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.trace.cut import LARGEST_GAP_DEG
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.arrays import median_of, range_of, sum_of
-from dbbstation.plan.plan import FULL_TURN_DEG, Circle, Direction
+from dbbstation.facts.quantities import FULL_TURN_DEG
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.trace.cut import LARGEST_GAP_DEG
 
 if TYPE_CHECKING:

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from dbbstation.results.programs import ProgramsResult, WrittenProgram
+    from dbbstation.nc.export import Program
+    from dbbstation.results.programs import ProgramsResult
 
 
 def print_programs(result: ProgramsResult) -> None:
@@ -40,7 +41,7 @@ def print_programs(result: ProgramsResult) -> None:
     _say_uncertainty(result.programs)
 
 
-def _say_uncertainty(programs: Sequence[WrittenProgram]) -> None:
+def _say_uncertainty(programs: Sequence[Program]) -> None:
     reasons = [each.model_uncertainty_not_known_because for each in programs]
     for why in dict.fromkeys(one for one in reasons if one):
         unsure = [each for each, one in zip(programs, reasons, strict=True) if one == why]

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import chain, pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import StationError
+from dbbstation.facts.serialise import AsItIs, Kept
+from dbbstation.facts.value import finite
 from dbbstation.machine.geometry import check_joints, check_model_is_of
 from dbbstation.model.identified import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
@@ -26,10 +29,11 @@ from dbbstation.nc.reach import check_feeds, check_reach
 from dbbstation.nc.setup import offset_text
 from dbbstation.nc.spilled import LongText, Spilled
 from dbbstation.nc.toolpath import in_pieces
+from dbbstation.plan.plan import chosen_of
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from dbbstation.computing.arrays import Integers
     from dbbstation.machine.geometry import Machine
@@ -39,6 +43,8 @@ if TYPE_CHECKING:
     from dbbstation.nc.dialect import Dialect
     from dbbstation.nc.toolpath import Toolpath
     from dbbstation.plan.plan import Circle, Plan
+
+    _Uncertainty = tuple[float | None, Mapping[str, float | None] | None, str | None]
 
 
 @dataclass(frozen=True)
@@ -61,35 +67,35 @@ class Inverse:
     strict: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Program:
-    """A program ready to be written.
+    """One program.
 
     Attributes:
-        points: moves at feed.
-        greatest_um: None in a nominal program.
-        chord_um: largest distance between a move and its path; None in a nominal program.
+        file: name, or path once written.
+        greatest_correction_um: None in a nominal program.
+        chord_error_um: largest distance between a move and its path; None in a nominal program.
         chord_asked_um: None in a nominal program.
-        uncertainty_um: greatest standard uncertainty of the tool tip along the path; None if unknown.
-        uncertainty_by_axis_um: of X, Y and Z; None if unknown, empty without a model.
-        why_unknown: empty if known.
-        tilt_left_um: tilt correction left out, 100 mm from the tip; None in a nominal program.
-        feed_s: computed time at feed; None in a nominal program, or for an unknown look-ahead.
+        model_uncertainty_um: greatest standard uncertainty of the tool tip along the path; None if unknown.
+        model_uncertainty_by_axis_um: None without a model.
+        tilt_left_um: tilt correction left out, 100 mm from the tip.
+        feed_s: computed time at feed; None for an unknown look-ahead.
     """
 
-    name: str
-    content: LongText
+    file: str
+    sha256: str
     points: int
-    greatest_um: float | None = None
-    chord_um: float | None = None
+    greatest_correction_um: float | None = None
+    chord_error_um: float | None = None
     chord_asked_um: float | None = None
-    uncertainty_um: float | None = None
-    uncertainty_by_axis_um: tuple[float | None, ...] = ()
-    why_unknown: str = ""
+    model_uncertainty_um: float | None = None
+    model_uncertainty_by_axis_um: Mapping[str, float | None] | None = None
+    model_uncertainty_not_known_because: str | None = None
     tilt_left_um: float | None = None
     feed_s: float | None = None
     nominal_feed_s: float | None = None
     remarks: tuple[str, ...] = ()
+    content: Annotated[LongText, AsItIs, Kept] = field(repr=False)
 
     @property
     def text(self) -> str:
@@ -124,11 +130,7 @@ def circle_programs(
     """
     if inverse is not None:
         check_model_is_of(machine, inverse.model.machine)
-    unknown = [name for name in tests if name not in plan.tests]
-    if unknown:
-        known = ", ".join(plan.tests)
-        raise StationError(f"the plan has no test {', '.join(unknown)}", where=plan.name, remedy=f"it has {known}")
-    runs = plan.runs(tests)
+    runs = plan.runs(chosen_of(plan.name, plan.tests, tests, ()))
     programs: list[Program] = []
     for number, ((name, direction), circle) in enumerate(runs.items(), 1):
         progress(len(programs), len(runs))
@@ -215,7 +217,8 @@ def _program(
     order = dialect.rotation or own
     written = path.in_order(order)
     if inverse is None:
-        return Program(name, LongText.of(dialect.write(written, header)), _points(written))
+        content = LongText.of(dialect.write(written, header))
+        return Program(file=name, sha256=content.sha256, points=_points(written), content=content)
     check_joints(inverse.model.machine)
     asked_um, prefer = 1e3 * chord_mm, inverse.prefer
     # The same machine, with angles in the order of the program that is written.
@@ -247,19 +250,20 @@ def _program(
         check_kept(total, asked_um, machine)
     together_um, by_axis_um, why = uncertainty
     return Program(
-        name,
-        content,
-        done.points,
-        total.greatest_um,
-        total.chord_um,
-        asked_um,
-        together_um,
-        by_axis_um,
-        why,
-        total.tilt_um,
-        None if dialect.look_ahead is None else total.seconds,
-        None if dialect.look_ahead is None else total.nominal_seconds,
-        remarks_on(total, asked_um, machine, dialect, prefer),
+        file=name,
+        sha256=content.sha256,
+        points=done.points,
+        greatest_correction_um=total.greatest_um,
+        chord_error_um=total.chord_um,
+        chord_asked_um=asked_um,
+        model_uncertainty_um=together_um,
+        model_uncertainty_by_axis_um=by_axis_um,
+        model_uncertainty_not_known_because=why,
+        tilt_left_um=total.tilt_um,
+        feed_s=None if dialect.look_ahead is None else total.seconds,
+        nominal_feed_s=None if dialect.look_ahead is None else total.nominal_seconds,
+        remarks=remarks_on(total, asked_um, machine, dialect, prefer),
+        content=content,
     )
 
 
@@ -323,9 +327,9 @@ UNCERTAIN_AT = 2000
 """Number of poses along the path at which the model's uncertainty is computed: it changes over decimetres."""
 
 
-def _uncertainty_um(path: Toolpath, inverse: Inverse) -> tuple[float | None, tuple[float | None, ...], str]:
+def _uncertainty_um(path: Toolpath, inverse: Inverse) -> _Uncertainty:
     if inverse.identified is None:
-        return None, (), ""
+        return None, None, None
     number = sum(int(_checked_pieces(part).sum()) for part in path.parts())
     some = np.unique(np.linspace(0, number - 1, UNCERTAIN_AT).astype(np.int64))
     poses, times_s, before, begin_s = [], [], 0, 0.0
@@ -341,10 +345,10 @@ def _uncertainty_um(path: Toolpath, inverse: Inverse) -> tuple[float | None, tup
     motion = Motion(poses=np.concatenate(poses), is_path=True, time_s=time_s)
     per_axis_um = 1e3 * position_uncertainty_mm(inverse.identified, motion)
     together_um = float(np.linalg.norm(per_axis_um, axis=1).max())
-    by_axis_um = tuple(None if np.isnan(um) else um for um in per_axis_um.max(axis=0).tolist())
-    if None in by_axis_um:
+    by_axis_um = dict(zip("xyz", map(finite, per_axis_um.max(axis=0).tolist()), strict=True))
+    if None in by_axis_um.values():
         return None, by_axis_um, inverse.identified.why_unknown
-    return together_um, by_axis_um, ""
+    return together_um, by_axis_um, None
 
 
 def _checked_pieces(path: Toolpath) -> Integers:
@@ -352,14 +356,14 @@ def _checked_pieces(path: Toolpath) -> Integers:
     return np.where(path.is_move, path.pieces(REACH_MM, REACH_DEG), 0)
 
 
-def _said_of_uncertainty(together_um: float | None, by_axis_um: tuple[float | None, ...], why: str) -> list[str]:
+def _said_of_uncertainty(
+    together_um: float | None, by_axis_um: Mapping[str, float | None] | None, why: str | None
+) -> list[str]:
     if together_um is not None:
         return [f"standard uncertainty of the model along the path {together_um:.3f} um at most"]
-    if not by_axis_um:
+    if by_axis_um is None:
         return []
-    each = (
-        f"{axis} {'not known' if um is None else f'{um:.3f} um'}" for axis, um in zip("XYZ", by_axis_um, strict=True)
-    )
+    each = (f"{axis.upper()} {'not known' if um is None else f'{um:.3f} um'}" for axis, um in by_axis_um.items())
     return [f"standard uncertainty of the model along the path at most: {', '.join(each)}", f"not known because {why}"]
 
 

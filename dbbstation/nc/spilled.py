@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import hashlib
 import mmap
 import tempfile
 import weakref
@@ -128,6 +129,14 @@ class LongText:
     def add(self, block: bytes) -> None:
         """Add to the end."""
         self._letters.add(np.frombuffer(block, np.uint8))
+
+    @property
+    def sha256(self) -> str:
+        """Return the SHA-256."""
+        digest = hashlib.sha256()
+        for block in self.blocks():
+            digest.update(block)
+        return digest.hexdigest()
 
     @property
     def letters(self) -> NDArray[np.uint8]:

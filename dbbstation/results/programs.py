@@ -2,57 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from dbbstation.facts import of_facts, picked
-from dbbstation.facts.serialise import AsItIs, Kept
+from dbbstation.facts import picked
+from dbbstation.facts.serialise import Kept
 from dbbstation.files.atomic import streamed
 from dbbstation.files.provenance import Provenance
-from dbbstation.nc.export import said_acceleration
+from dbbstation.nc.export import Program, said_acceleration
 from dbbstation.nc.spilled import LongText
 from dbbstation.results.frame import Framed
 
 if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
     from dbbstation.nc.dialect import Dialect
-    from dbbstation.nc.export import Program
-
-
-@dataclass(frozen=True, kw_only=True)
-class WrittenProgram:
-    """One program.
-
-    Attributes:
-        greatest_correction_um: None in a nominal program.
-        chord_error_um: largest distance between a move and its path.
-        model_uncertainty_um: greatest standard uncertainty of the tool tip along the path; None if unknown.
-        tilt_left_um: tilt correction left out, 100 mm from the tip.
-        feed_s: computed time at feed; None for an unknown look-ahead.
-    """
-
-    file: str
-    sha256: str
-    points: int
-    greatest_correction_um: float | None
-    chord_error_um: float | None
-    chord_asked_um: float | None
-    model_uncertainty_um: float | None
-    model_uncertainty_by_axis_um: Mapping[str, float | None] | None
-    model_uncertainty_not_known_because: str | None
-    tilt_left_um: float | None
-    feed_s: float | None
-    nominal_feed_s: float | None
-    remarks: tuple[str, ...]
-    content: Annotated[LongText, AsItIs, Kept] = field(repr=False)
-
-    @property
-    def text(self) -> str:
-        """Return the whole program."""
-        return str(self.content)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +33,7 @@ class ProgramsResult(Framed):
     model_sha256: str | None
     acceleration_mm_s2: float | None
     acceleration_known: bool | None
-    programs: tuple[WrittenProgram, ...]
+    programs: tuple[Program, ...]
     model_warnings: tuple[str, ...] = ()
     acceleration_in_words: Annotated[str, Kept] = ""
 
@@ -98,7 +63,7 @@ def write_programs(path: Path, contents: Iterable[LongText], *, force: bool) -> 
 
 
 def programs_result(
-    written: Sequence[tuple[str, Program]],
+    written: Sequence[Program],
     dialect: Dialect,
     machine: Machine | None,
     model_sha256: str | None,
@@ -113,24 +78,7 @@ def programs_result(
         model_sha256=model_sha256,
         acceleration_mm_s2=None if planned is None else planned.planned_acceleration_mm_s2,
         acceleration_known=None if planned is None else planned.acceleration_mm_s2 is not None,
-        programs=tuple(_written(file, each) for file, each in written),
+        programs=tuple(written),
         model_warnings=model_warnings,
         acceleration_in_words="" if planned is None else said_acceleration(planned),
-    )
-
-
-def _written(file: str, each: Program) -> WrittenProgram:
-    digest = hashlib.sha256()
-    for block in each.content.blocks():
-        digest.update(block)
-    return of_facts(
-        WrittenProgram,
-        each,
-        file=file,
-        sha256=digest.hexdigest(),
-        greatest_correction_um=each.greatest_um,
-        chord_error_um=each.chord_um,
-        model_uncertainty_um=each.uncertainty_um,
-        model_uncertainty_by_axis_um=dict(zip("xyz", each.uncertainty_by_axis_um, strict=False)) or None,
-        model_uncertainty_not_known_because=each.why_unknown or None,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -121,8 +122,8 @@ def program(
         approach=None if bar_stays_on else Approach(clearance_mm),
         progress=telling.counted("programs"),
     )
-    write_folder(folder, {each.name: each.text for each in programs}, force=force)
-    written = [(str(folder / each.name), each) for each in programs]
+    write_folder(folder, {each.file: each.text for each in programs}, force=force)
+    written = [replace(each, file=str(folder / each.file)) for each in programs]
     digest = sha256_of(Path(model)) if isinstance(model, str | PathLike) else None
     return programs_result(
         written, written_in, None if inverse is None else hexapod, digest, tuple(telling.notes), warnings

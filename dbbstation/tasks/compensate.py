@@ -215,5 +215,10 @@ def compensate(
         write_programs(Path(out), [done.content], force=force)
     digest = sha256_of(Path(model)) if isinstance(model, str | PathLike) else None
     return programs_result(
-        [(str(out or done.name), done)], writer, inverse.model.machine, digest, tuple(telling.notes), warnings
+        [replace(done, file=str(out or done.file))],
+        writer,
+        inverse.model.machine,
+        digest,
+        tuple(telling.notes),
+        warnings,
     )

@@ -43,11 +43,11 @@ def test_a_compensated_program_commands_what_takes_the_machine_round_the_nominal
     linuxcnc, table2, crooked, tests
 ):
     for program in circle_programs(table2, crooked.machine, linuxcnc, inverse=Inverse(crooked), tests=list(tests)):
-        name, direction = program.name.removesuffix(".ngc").split("-")
+        name, direction = program.file.removesuffix(".ngc").split("-")
         test = table2.tests[name]
         circle = next(test.run(each) for each in test.directions if each == direction)
         run = replace(observed(circle), commanded=None)
-        run = replace(run, commanded=commanded_poses(program.text, program.name, run))
+        run = replace(run, commanded=commanded_poses(program.text, program.file, run))
         reached = crooked.actual_poses(run.motion())
         ways = reached[:, :3] - circle.ball_mm
         chord = chord_error_mm(circle, 0.1)
@@ -64,7 +64,7 @@ def test_a_compensated_program_commands_what_takes_the_machine_round_the_nominal
 def test_at_its_points_the_circle_is_met_to_the_rounding(linuxcnc, table2, crooked):
     circle = table2.tests["d"].circle
     (program, _) = circle_programs(table2, crooked.machine, linuxcnc, inverse=Inverse(crooked), tests=["d"])
-    path = linuxcnc.read(program.text, program.name)
+    path = linuxcnc.read(program.text, program.file)
     arc = np.flatnonzero(np.abs(path.tip_mm - 0.26) < 0.01)
     middle = (path.end_s[arc[0]] - path.duration_s[arc[0]] + path.end_s[arc[-1]]) / 2.0
     phi = 180.0 + (path.end_s[arc] - middle) * circle.turning_deg_s

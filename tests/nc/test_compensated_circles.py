@@ -30,7 +30,7 @@ def compensated(request, linuxcnc, table2, crooked) -> dict[str, Toolpath]:
     """Read back from the text: what the control will really be told."""
     programs = circle_programs(table2, crooked.machine, linuxcnc, inverse=Inverse(crooked), tests=list(request.param))
     assert len(programs) == 2 * len(request.param)
-    return {program.name: linuxcnc.read(program.text, program.name) for program in programs}
+    return {program.file: linuxcnc.read(program.text, program.file) for program in programs}
 
 
 def off_the_circle_mm(poses: np.ndarray, circle: Circle) -> tuple[np.ndarray, np.ndarray]:
@@ -86,8 +86,8 @@ def test_a_machine_without_errors_gets_the_nominal_program(linuxcnc, table2, ref
     perfect = replace(perfect, prefer=Prefer.POSITION_ONLY)
     same = circle_programs(table2, reference, linuxcnc, inverse=perfect, tests=["h"])
     for program, other in zip(nominal, same, strict=True):
-        assert other.greatest_um == pytest.approx(0.0, abs=1e-6)
-        there, here = (linuxcnc.read(each.text, each.name) for each in (program, other))
+        assert other.greatest_correction_um == pytest.approx(0.0, abs=1e-6)
+        there, here = (linuxcnc.read(each.text, each.file) for each in (program, other))
         np.testing.assert_allclose(here.poses[here.is_move], there.poses[there.is_move], rtol=0.0, atol=1.1e-6)
 
 

@@ -280,7 +280,7 @@ def test_a_dialect_learns_which_of_the_programs_it_writes(tmp_path, table2, refe
     """
     dialect = dialect_given(own(tmp_path, body))
     programs = circle_programs(table2, reference, dialect, tests=["a", "b"])
-    assert [each.name for each in programs] == ["O0001.own", "O0002.own", "O0003.own", "O0004.own"]
+    assert [each.file for each in programs] == ["O0001.own", "O0002.own", "O0003.own", "O0004.own"]
     assert programs[2].text.startswith("(O0003 test b ")
 
 
@@ -400,7 +400,7 @@ def test_angles_are_written_in_the_order_of_the_control(tip, linuxcnc, crooked):
     path = read_program(TILTING, "part.ngc")
     assert crooked.machine.hexapod.rotation is Rotation.XYZ
     programs = [compensated_program(path, each, Inverse(crooked)) for each in (linuxcnc, tip)]
-    here, there = (one.toolpath(each.text, each.name) for one, each in zip((linuxcnc, tip), programs, strict=True))
+    here, there = (one.toolpath(each.text, each.file) for one, each in zip((linuxcnc, tip), programs, strict=True))
     assert there.rotation is Rotation.ZYX
     one, other = (each.poses[each.is_move & (each.line > 0)] for each in (here, there))
     ends = [
@@ -440,7 +440,7 @@ def test_tcp_is_turned_on_and_off_and_comments_keep_to_the_alphabet(tip, crooked
     assert "PART: FLANSCH  7" in comments
     assert all(re.fullmatch("[A-Z0-9 .:]*", each) for each in comments)
     with pytest.raises(StationError, match="compensated already, says its header"):
-        compensated_program(tip.toolpath(program.text, program.name), tip, Inverse(crooked))
+        compensated_program(tip.toolpath(program.text, program.file), tip, Inverse(crooked))
 
 
 @pytest.mark.parametrize(

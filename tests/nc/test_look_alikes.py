@@ -58,7 +58,7 @@ def test_the_tool_goes_along_their_path(style, linuxcnc, crooked):
     seed = style + len(STYLES)
     path = read_program(look_alike(seed), "drawn.ngc")
     written = compensated_program(path, linuxcnc, Inverse(model), chord_mm=1e-3)
-    assert written.chord_um <= 1.0
+    assert written.chord_error_um <= 1.0
     done = read_program(written.text, "written.ngc")
     row, share = done.subdivided(2.0, 2.0)
     commanded = done.between(row, share)[(done.kind[row] == RowKind.FEED)]

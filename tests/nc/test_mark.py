@@ -89,7 +89,11 @@ def test_a_program_with_four_decimals_is_known_and_its_rounding_is_part_of_what_
     fine, coarse = (compensated_program(path, dialect, Inverse(crooked)) for dialect in (linuxcnc, Coarse()))
     assert re.search(r"X\d+\.\d{4} ", coarse.text)
     # Half a last decimal in each of three angles, 100 mm from the tip: 0.15 µm; the mark adds three decimals at most.
-    assert 0.01 < coarse.chord_um - fine.chord_um < 7.0 * 0.5e-4 * np.radians(100.0) * np.sqrt(3.0) * 1e3 + 0.01
+    assert (
+        0.01
+        < coarse.chord_error_um - fine.chord_error_um
+        < 7.0 * 0.5e-4 * np.radians(100.0) * np.sqrt(3.0) * 1e3 + 0.01
+    )
     with pytest.raises(StationError, match="compensated already"):
         compensated_program(Coarse().read(change(coarse.text), "again.ngc"), linuxcnc, Inverse(crooked))
 

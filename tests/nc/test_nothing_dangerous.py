@@ -332,7 +332,7 @@ def test_a_correction_beyond_a_millimetre_is_refused_and_beyond_the_option_too(l
     with pytest.raises(StationError, match=r"part\.ngc:[23]: .*more than 1 mm.*--largest-correction-mm"):
         compensated_program(path, linuxcnc, Inverse(model))
     allowed = compensated_program(path, linuxcnc, Inverse(model, largest_mm=5.0))
-    assert 1000.0 < allowed.greatest_um < 5000.0
+    assert 1000.0 < allowed.greatest_correction_um < 5000.0
     with pytest.raises(StationError, match=r"more than 1\.2 mm"):
         compensated_program(path, linuxcnc, Inverse(model, largest_mm=1.2))
 

@@ -213,6 +213,6 @@ def test_curves_in_short_lines_are_joined(linuxcnc, crooked):
         linuxcnc.read(text, "short.ngc"), linuxcnc, Inverse(accelerating(crooked, 1000.0)), chord_mm=1e-3
     )
     assert done.points < 0.5 * len(lines)
-    assert done.chord_um <= 1.0
+    assert done.chord_error_um <= 1.0
     first, second = run(text, mm_s2=1000.0, faster=FASTER), on_its_path(linuxcnc, done.text, 1000.0)
     assert second.moving_s / first.moving_s <= KEPT

@@ -151,8 +151,8 @@ def test_a_tolerance_that_is_missed_is_said_and_strictly_refused_with_what_is_ke
     model = MachineModel(machine, (Fitted(Wound(), np.array([0.03])),))
     path = linuxcnc.read("G21 G90\nG0 X-100 Y10 Z-1000 A0 B0 C0\nG1 X100 F100\nM2\n", "line.ngc")
     done = compensated_program(path, linuxcnc, Inverse(model))
-    assert 1.0 < done.chord_um <= 100.0
-    assert f"; chord error asked for 0.1 um, reached {done.chord_um:.3f} um" in done.text
+    assert 1.0 < done.chord_error_um <= 100.0
+    assert f"; chord error asked for 0.1 um, reached {done.chord_error_um:.3f} um" in done.text
     (told,) = done.remarks
     assert re.match(r"the path is kept within \d+ µm, not within 0\.1 µm, at [^ ]*:3: the correction has a step", told)
     with pytest.raises(StationError, match=r"line\.ngc:3: the path is kept within \d+ µm here") as refused:
@@ -176,10 +176,10 @@ def test_a_circle_takes_the_step_that_its_feed_needs(linuxcnc, table2, crooked):
     machine = replace(crooked.machine, acceleration_mm_s2=1000.0)
     model = MachineModel(machine, crooked.sources)
     (one, _) = circle_programs(table2, machine, linuxcnc, inverse=Inverse(model), tests=["a"])
-    path = linuxcnc.read(one.text, one.name)
+    path = linuxcnc.read(one.text, one.file)
     arc_mm = np.median(path.tip_mm[path.kind == RowKind.FEED])
     assert 2.0 * (1000.0 / 60.0) ** 2 / 1000.0 < arc_mm < 0.65
-    assert one.chord_um == pytest.approx(1e3 * arc_mm**2 / (8.0 * 150.0), rel=0.05)
+    assert one.chord_error_um == pytest.approx(1e3 * arc_mm**2 / (8.0 * 150.0), rel=0.05)
     assert one.feed_s <= 1.01 * one.nominal_feed_s
 
 
@@ -188,7 +188,7 @@ def test_a_circle_that_is_slower_is_written_and_says_so(linuxcnc, table2, crooke
     machine = replace(crooked.machine, acceleration_mm_s2=1000.0)
     model = MachineModel(machine, crooked.sources)
     (slow, _) = circle_programs(table2, machine, linuxcnc, inverse=Inverse(model), tests=["a"], chord_mm=1e-4)
-    assert slow.chord_um <= 0.1
+    assert slow.chord_error_um <= 0.1
     (told,) = slow.remarks
     said = f"about {slow.feed_s:.0f} s at feed, {slow.nominal_feed_s:.0f} as written, with the acceleration of 1 m/s²"
     assert told == f"{said} (of the machine file)"

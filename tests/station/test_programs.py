@@ -46,7 +46,7 @@ def folder(one_way: Path, tmp_path: Path) -> Path:
     made = tmp_path / "programs"
     made.mkdir()
     for program in programs:
-        (made / program.name).write_text(program.text, encoding="utf-8")
+        (made / program.file).write_text(program.text, encoding="utf-8")
     return made
 
 

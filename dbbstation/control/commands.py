@@ -24,13 +24,7 @@ def correction_of(
     kind: Literal["kinematics", "parameters"], digest: str, date: str, taken_out: Iterable[Fitted], machine: Machine
 ) -> ControlCorrection:
     """Return a control's correction in the form of a machine file."""
-    sources = {
-        fitted.source.name: {
-            parameter.name: float(value)
-            for parameter, value in zip(fitted.source.parameters(machine), fitted.values, strict=True)
-        }
-        for fitted in taken_out
-    }
+    sources = {fitted.source.name: fitted.by_name(machine) for fitted in taken_out}
     return ControlCorrection(kind, digest, date, sources)
 
 

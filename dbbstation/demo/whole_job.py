@@ -115,7 +115,7 @@ def write_truth(path: Path, machine_file: Path, seed: int) -> None:
     machine = read_machine(machine_file)
     gravity = Fitted(known_sources()["gravity"], np.array([COMPLIANCE_UM_KN]))
     fitted = (*random_kinematics(machine, seed), gravity)
-    rows = tuple((f.source.name, "", p.name) for f in fitted for p in f.source.parameters(machine))
+    rows = tuple(row for f in fitted for row in f.rows(machine))
     exact = np.zeros((len(rows), len(rows)))
     write_model(path, IdentifiedModel(MachineModel(machine, fitted), rows, exact))
 

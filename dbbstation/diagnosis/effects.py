@@ -254,9 +254,7 @@ def _groups(model: MachineModel) -> Iterator[tuple[str, tuple[Fitted, ...]]]:
 
 def _places(group: Sequence[Fitted], model: MachineModel, rows: Sequence[Row]) -> list[int] | None:
     place = {row: k for k, row in enumerate(rows)}
-    names = [
-        (f.source.name, f.shared, parameter.name) for f in group for parameter in f.source.parameters(model.machine)
-    ]
+    names = [row for f in group for row in f.rows(model.machine)]
     return [place[name] for name in names] if all(name in place for name in names) else None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeVar, TypeVarTuple, Unpack
 
 from dbbstation.errors import InputError, Problem
@@ -43,15 +44,21 @@ def blocks_of(path: Path) -> Iterator[bytes]:
         InputError: it cannot be read.
     """
     digest = hashlib.sha256()
-    try:
-        with opened(path) as source:
-            for block in source.blocks():
-                digest.update(block)
-                yield block
-    except OSError as error:
-        raise InputError([unreadable(path, error)]) from error
+    with readable(path), opened(path) as source:
+        for block in source.blocks():
+            digest.update(block)
+            yield block
     open_book().note_read(path)
     note_input(path, digest.hexdigest())
+
+
+@contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """Raise InputError if the file cannot be read."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError([unreadable(path, error)]) from error
 
 
 def unreadable(path: Path, error: OSError) -> Problem:

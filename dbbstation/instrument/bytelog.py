@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Literal
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.gateway import opened
 from dbbstation.files.inputs import open_book
-from dbbstation.files.source_text import lines_of, unreadable
+from dbbstation.files.source_text import lines_of, readable
 from dbbstation.system.handles import Closing
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def read_byte_log(path: Path) -> Iterator[Chunk]:
 def _lines(path: Path) -> Generator[tuple[int, str]]:
     number = 0
     try:
-        with opened(path) as source:
+        with readable(path), opened(path) as source:
             open_book().note_read(path)
             for number, (line, _) in enumerate(pairwise(lines_of(source.blocks())), start=1):
                 if number > 1:
@@ -144,8 +144,6 @@ def _lines(path: Path) -> Generator[tuple[int, str]]:
             else:
                 if number:
                     return
-    except OSError as error:
-        raise InputError([unreadable(path, error)]) from error
     except UnicodeDecodeError:
         raise InputError.of(path, "not a byte log: not UTF-8 text", line=number) from None
     raise InputError.of(path, f"not a byte log: the first line is not {_HEAD!r}", line=1, column=1)

@@ -162,7 +162,7 @@ def _of_model(
     row_of = {row: k for k, row in enumerate(identified.covariance_rows)}
     columns, rows = [], []
     for fitted in model.acting(motion):
-        names = [(fitted.source.name, fitted.shared, p.name) for p in fitted.source.parameters(model.machine)]
+        names = fitted.rows(model.machine)
         known = [k for k, name in enumerate(names) if name in row_of]
         columns.append(reading.by_fitted(fitted)[:, known])
         rows += [row_of[names[k]] for k in known]

@@ -158,7 +158,7 @@ def _sensitivity(identified: IdentifiedModel, motion: Motion) -> tuple[Floats, F
     silent = [np.zeros((3, count, 0))]
     for fitted in model.acting(motion):
         derivative = actual.derivative(fitted)
-        names = [(fitted.source.name, fitted.shared, p.name) for p in fitted.source.parameters(model.machine)]
+        names = fitted.rows(model.machine)
         columns = [row_of[name] for name in names if name in row_of]
         known = [k for k, name in enumerate(names) if name in row_of]
         whole = np.array(

@@ -649,3 +649,11 @@ class Fitted:
     def zero(cls, source: ErrorSource, machine: Machine, shared: str = "") -> Self:
         """Return a source with zero values."""
         return cls(source, np.zeros(len(source.parameters(machine))), shared)
+
+    def rows(self, machine: Machine) -> list[tuple[str, str, str]]:
+        """Return source, group and parameter of each value, as in the rows of a covariance."""
+        return [(self.source.name, self.shared, parameter.name) for parameter in self.source.parameters(machine)]
+
+    def by_name(self, machine: Machine) -> dict[str, float]:
+        """Return the values by parameter."""
+        return dict(zip((p.name for p in self.source.parameters(machine)), self.values.tolist(), strict=True))

@@ -189,12 +189,7 @@ class VirtualMachine:
                     "name": fitted.source.name,
                     "belongs_to": fitted.source.belongs_to.value,
                     "shared": fitted.shared,
-                    "parameters": {
-                        parameter.name: float(value)
-                        for parameter, value in zip(
-                            fitted.source.parameters(self.truth.machine), fitted.values, strict=True
-                        )
-                    },
+                    "parameters": fitted.by_name(self.truth.machine),
                 }
                 for fitted in sources
             ],

@@ -18,7 +18,7 @@ from dbbstation.files.formats.session import PART, Counts
 from dbbstation.files.gateway import digest_of, opened
 from dbbstation.files.inputs import note_input, open_book
 from dbbstation.files.recordings.run_lines import fault_of_line, pieces_of
-from dbbstation.files.source_text import unreadable
+from dbbstation.files.source_text import readable
 from dbbstation.trace import columns
 from dbbstation.trace.recording import Recording
 
@@ -161,19 +161,16 @@ def read_run(path: Path, *, sha256: str = "") -> RunFile:
         InputError: every fault of the file with its line.
     """
     digest = hashlib.sha256()
-    try:
-        with opened(path) as source:
-            open_book().note_read(path)
-            blocks = _hashed(source.blocks(), digest)
-            run: RunFile | InputError
-            try:
-                run = _parsed(blocks, str(path), partial=path.suffix == PART)
-            except InputError as error:
-                run = error
-            for _ in blocks:
-                pass  # what is not worth parsing counts for the hash
-    except OSError as error:
-        raise InputError([unreadable(path, error)]) from error
+    with readable(path), opened(path) as source:
+        open_book().note_read(path)
+        blocks = _hashed(source.blocks(), digest)
+        run: RunFile | InputError
+        try:
+            run = _parsed(blocks, str(path), partial=path.suffix == PART)
+        except InputError as error:
+            run = error
+        for _ in blocks:
+            pass  # what is not worth parsing counts for the hash
     if not sha256:
         note_input(path, digest.hexdigest())
     elif digest.hexdigest() != sha256:
@@ -195,10 +192,8 @@ def sha256_of(path: Path) -> str:
     Raises:
         InputError: it cannot be read.
     """
-    try:
+    with readable(path):
         return digest_of(path)
-    except OSError as error:
-        raise InputError([unreadable(path, error)]) from error
 
 
 def changed(file: str) -> Problem:

@@ -10,9 +10,8 @@ from sys import intern
 from typing import TYPE_CHECKING
 
 from dbbstation.catalogue import meant
-from dbbstation.errors import InputError
 from dbbstation.files.formats.number_language import NUMBER
-from dbbstation.files.source_text import LONGEST_LINE, decode, first_line, shortened, unreadable, without_faults
+from dbbstation.files.source_text import LONGEST_LINE, decode, first_line, readable, shortened, without_faults
 from dbbstation.trace import columns
 
 if TYPE_CHECKING:
@@ -183,10 +182,8 @@ def split_head(path: Path) -> tuple[str, ...]:
     Raises:
         InputError: the file cannot be read.
     """
-    try:
+    with readable(path):
         head = first_line(path)
-    except OSError as error:
-        raise InputError([unreadable(path, error)]) from error
     text = without_faults(decode, head, str(path))
     return tuple(name.strip() for name in text.split(",")) if text else ()
 

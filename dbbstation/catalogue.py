@@ -7,16 +7,16 @@ import importlib
 import importlib.metadata
 import pkgutil
 import traceback
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from inspect import getmembers, isabstract, isclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeVar
 
 from dbbstation.errors import InputError, Problem, StationError, refuse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from types import ModuleType
 
 
@@ -74,21 +74,42 @@ class FoundClass(Generic[Base]):
         raise InputError([self.fault(f"{self.kind.__name__}: {what}") for what in said])
 
 
-def in_folders(base: type[Thing], *folders: ModuleType) -> Mapping[str, Thing]:
-    """Return one instance of every class of the package, sorted by name.
+class InFolders(Mapping[str, Thing]):
+    """One instance of every class of the package's folders by name.
+
+    A name that a module has is looked up in this module alone, so that the others are not imported.
 
     Args:
         base: abstract classes and names with an underscore do not count.
     """
-    found: dict[str, Thing] = {}
-    for folder in folders:
-        for module in pkgutil.iter_modules(folder.__path__):
-            content = importlib.import_module(f"{folder.__name__}.{module.name}")
-            for kind in classes_of(content, base):
+
+    def __init__(self, base: type[Thing], *folders: ModuleType) -> None:
+        self._base = base
+        modules = (
+            (module.name, folder.__name__) for folder in folders for module in pkgutil.iter_modules(folder.__path__)
+        )
+        self._modules = {name.replace("_", "-"): f"{folder}.{name}" for name, folder in modules}
+        self._found: dict[str, Thing] = {}
+
+    def __getitem__(self, name: str) -> Thing:
+        if name not in self._found:
+            self._import(name if name in self._modules else None)
+        return self._found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        self._import(None)
+        return iter(sorted(self._found))
+
+    def __len__(self) -> int:
+        self._import(None)
+        return len(self._found)
+
+    def _import(self, name: str | None) -> None:
+        for module in [name] if name else list(self._modules):
+            for kind in classes_of(importlib.import_module(self._modules.pop(module)), self._base):
                 if not isabstract(kind):
                     one = kind()
-                    found[one.name] = one
-    return MappingProxyType(dict(sorted(found.items())))
+                    self._found[one.name] = one
 
 
 def classes_of(module: ModuleType, base: type[Base] | tuple[type[Base], ...]) -> list[type[Base]]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from dbbstation.errors import ModelError, StationError
+from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import ControlCorrection
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
@@ -26,19 +26,6 @@ def correction_of(
     """Return a control's correction in the form of a machine file."""
     sources = {fitted.source.name: fitted.by_name(machine) for fitted in taken_out}
     return ControlCorrection(kind, digest, date, sources)
-
-
-def refuse_second_correction(machine: Machine) -> None:
-    """Refuse to compensate programs if the control corrects the machine itself.
-
-    Raises:
-        StationError: names the control's correction.
-    """
-    if machine.control is not None:
-        raise StationError(
-            f"the control of {machine.name!r} corrects the machine already: {machine.control.said}",
-            remedy="run nominal programs; or take the correction out of the control, and `control` out of the machine file",
-        )
 
 
 def nominal_commands(machine: Machine, poses: Floats, known: Mapping[str, ErrorSource]) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from dbbstation.computing.arrays import Floats
-from dbbstation.errors import ModelError
+from dbbstation.errors import ModelError, StationError
 from dbbstation.facts.quantities import LimitsDeg, LimitsMm, Mass, Quantity, complaint
 from dbbstation.facts.record import AsArray, Record, Sha256Hex
 from dbbstation.text.written import listed
@@ -335,6 +335,19 @@ def check_model_is_of(machine: Machine, calibrated: Machine) -> None:
         raise ModelError(
             f"{what}: {in_words(found)}",
             remedy="use the model of this machine, or the machine file that the model's sessions were recorded with",
+        )
+
+
+def refuse_second_correction(machine: Machine) -> None:
+    """Refuse to compensate programs if the control corrects the machine itself.
+
+    Raises:
+        StationError: names the control's correction.
+    """
+    if machine.control is not None:
+        raise StationError(
+            f"the control of {machine.name!r} corrects the machine already: {machine.control.said}",
+            remedy="run nominal programs; or take the correction out of the control, and `control` out of the machine file",
         )
 
 

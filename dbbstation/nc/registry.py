@@ -7,7 +7,7 @@ from pathlib import PurePath
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from dbbstation.catalogue import added, in_folders, installed, looked_up
+from dbbstation.catalogue import InFolders, added, installed, looked_up
 from dbbstation.errors import Problem, StationError, refuse
 from dbbstation.nc import dialects
 from dbbstation.nc.dialect import Dialect
@@ -32,9 +32,12 @@ def known_dialects() -> Mapping[str, Dialect]:
         InputError: a package has a dialect that cannot be used, or whose name is taken.
     """
     faults: list[Problem] = []
-    found: dict[str, Dialect] = dict(in_folders(Dialect, dialects))  # type: ignore[type-abstract]  # what derives from it is made
-    whose: dict[str, str] = {}
-    for other in installed(GROUP, Dialect, faults):  # type: ignore[type-abstract]  # what derives from it is made
+    own = InFolders(Dialect, dialects)  # type: ignore[type-abstract]  # what derives from it is made
+    others = installed(GROUP, Dialect, faults)  # type: ignore[type-abstract]  # what derives from it is made
+    if not (others or faults):
+        return own
+    found, whose = dict(own), dict[str, str]()
+    for other in others:
         added(found, whose, other.kind(), other.place, called="an NC dialect", faults=faults)
     refuse(faults)
     return MappingProxyType(dict(sorted(found.items())))

@@ -6,7 +6,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from dbbstation.catalogue import FoundClass, added, in_folders, installed, looked_up
+from dbbstation.catalogue import FoundClass, InFolders, added, installed, looked_up
 from dbbstation.errors import InputError, ModelError, Problem, refuse
 from dbbstation.sources import causes, unmodelled
 from dbbstation.sources.contract import ErrorSource
@@ -35,7 +35,7 @@ def known_sources() -> Mapping[str, ErrorSource]:
 def _known() -> tuple[Mapping[str, ErrorSource], Mapping[str, str]]:
     faults: list[Problem] = []
     others = installed(GROUP, _BASE, faults)
-    found, whose = _with(in_folders(_BASE, causes, unmodelled), {}, others, faults)
+    found, whose = _with(InFolders(_BASE, causes, unmodelled), {}, others, faults)
     refuse(faults)
     return found, whose
 
@@ -59,6 +59,8 @@ def _with(
     others: Sequence[FoundClass[ErrorSource]],
     faults: list[Problem],
 ) -> tuple[Mapping[str, ErrorSource], Mapping[str, str]]:
+    if not others:
+        return known, whose
     found, places = dict(known), dict(whose)
     for other in others:
         try:

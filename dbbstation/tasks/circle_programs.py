@@ -78,12 +78,12 @@ def program(
         OutputError: a program exists without `force`.
         StoppedError: `stop` returned True; nothing was written.
     """
-    from dbbstation.control.commands import refuse_second_correction
     from dbbstation.files.atomic import write_folder
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.files.own_dialects import dialect_given
     from dbbstation.files.provenance import from_python
+    from dbbstation.machine.geometry import refuse_second_correction
     from dbbstation.nc.circle_program import Approach
     from dbbstation.nc.export import circle_programs
     from dbbstation.plan.plan import chosen_of

@@ -147,12 +147,11 @@ def compensate(
     """
     import numpy as np
 
-    from dbbstation.control.commands import refuse_second_correction
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.own_dialects import dialect_given
     from dbbstation.files.provenance import from_python
-    from dbbstation.machine.geometry import check_model_is_of
+    from dbbstation.machine.geometry import check_model_is_of, refuse_second_correction
     from dbbstation.nc.export import compensated_program
     from dbbstation.nc.registry import dialect_of_file
     from dbbstation.results.model_warnings import model_warnings

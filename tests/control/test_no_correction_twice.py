@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dbbstation.control.commands import correction_of, nominal_commands, refuse_second_correction
+from dbbstation.control.commands import correction_of, nominal_commands
 from dbbstation.errors import InputError, ModelError, StationError
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.new_session import write_session
+from dbbstation.machine.geometry import refuse_second_correction
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Motion

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
+from dbbstation.catalogue import InFolders
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import Rotation
-from dbbstation.sources.contract import Effect, Need, Owner
+from dbbstation.sources import causes
+from dbbstation.sources.contract import Effect, ErrorSource, Need, Owner
 from dbbstation.sources.registry import known_sources, sources_named
 from tests.sources.runs import random_machine, random_run
 
@@ -109,3 +112,12 @@ def test_an_unknown_source_is_refused_with_those_that_exist():
         sources_named(["wear"])
     with pytest.raises(ModelError, match=r"no error source is called 'gravitation'; did you mean gravity\?"):
         sources_named(["gravitation"])
+
+
+def test_a_source_is_looked_up_in_its_own_file_alone(monkeypatch):
+    imported, load = [], importlib.import_module
+    monkeypatch.setattr(importlib, "import_module", lambda name: imported.append(name) or load(name))
+    found = InFolders(ErrorSource, causes)
+    assert found["mounting"].name == "mounting"
+    assert imported == [f"{causes.__name__}.mounting"]
+    assert {name.replace("-", "_") for name in found} == {name.removeprefix(f"{causes.__name__}.") for name in imported}

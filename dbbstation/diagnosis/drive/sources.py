@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation import laws
-from dbbstation.catalogue import in_folders, looked_up
+from dbbstation.catalogue import InFolders, looked_up
 from dbbstation.errors import ModelError
 from dbbstation.laws.contract import MOVING, TableSource
 
@@ -35,7 +35,7 @@ COLUMNS: Mapping[str, Callable[[Signals], Floats]] = {
 @cache
 def known_drive_sources() -> Mapping[str, TableSource]:
     """Return all causes, sorted by name."""
-    return in_folders(TableSource, laws)  # type: ignore[type-abstract] # subclasses are instantiated
+    return InFolders(TableSource, laws)  # type: ignore[type-abstract] # subclasses are instantiated
 
 
 def drive_sources_named(names: Iterable[str]) -> tuple[TableSource, ...]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 import runpy
+import shutil
 import subprocess
 import sys
 from contextlib import chdir
@@ -15,12 +17,20 @@ import pytest
 import dbbstation as dbb
 from dbbstation.demo import whole_job
 from dbbstation.demo.whole_job import QUICK, run_demo
+from dbbstation.facts.serialise import as_objects, read_plain
 from dbbstation.files.recordings.session import read_session
+from dbbstation.results.demo import DemoCircle, DemoResult
 from tests.cli.conftest import call
+from tests.released import installed, quick_demo, wheel
+
+__all__ = ["installed", "quick_demo", "wheel"]
 
 SCRIPT = Path(__file__).parents[1] / "docs" / "examples" / "whole_job.py"
 EIGHT = "abdfhjkn"
 """Of the fifteen: all three heights, tilted and level; half of the work."""
+
+
+STEPS = ["measure", "calibrate", "diagnose", "program", "measure", "evaluate", "evaluate", "report"]
 
 
 @pytest.mark.nightly  # the three tests of `demo --quick` are in CI
@@ -38,8 +48,16 @@ def test_the_whole_job(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("tests", [QUICK, pytest.param(EIGHT, marks=pytest.mark.nightly)], ids=["quick", "eight"])
-def test_the_whole_job_on_some_of_its_circles(tmp_path, monkeypatch, tests):
+def test_the_whole_job_on_three_of_its_circles(tmp_path, quick_demo):
+    told = [line.removeprefix("$ ") for line in quick_demo.err.splitlines() if line.startswith("$ ")]
+    steps = [line.removeprefix("dbbstation ").split()[0] for line in told]
+    assert steps == STEPS
+    job = shutil.copytree(quick_demo.job, tmp_path / "job")  # a script writes into it
+    _does_the_whole_job(job, json.loads(quick_demo.out), len(QUICK))
+
+
+@pytest.mark.nightly
+def test_the_whole_job_on_eight_of_its_circles(tmp_path, monkeypatch):
     told = []
 
     def answer(job, arguments):
@@ -50,11 +68,26 @@ def test_the_whole_job_on_some_of_its_circles(tmp_path, monkeypatch, tests):
         return outcome.out
 
     monkeypatch.setattr(whole_job.DemoJob, "answer", answer)
-    result = run_demo(tmp_path / "job", 3, told.append, lambda *_: None, tests)
+    result = run_demo(tmp_path / "job", 3, told.append, lambda *_: None, EIGHT)
     steps = [line.removeprefix("dbbstation ").split()[0] for line in told]
-    assert steps == ["measure", "calibrate", "diagnose", "program", "measure", "evaluate", "evaluate", "report"]
+    assert steps == STEPS
     printed = {name: json.loads(answer) for name, answer in result.printed.items()}
-    _does_the_whole_job(tmp_path / "job", {"runs": [asdict(run) for run in result.runs], **printed}, len(tests))
+    _does_the_whole_job(tmp_path / "job", {"runs": [asdict(run) for run in result.runs], **printed}, len(EIGHT))
+
+
+@pytest.mark.slow
+def test_a_table_of_the_circles_is_printed(tmp_path, monkeypatch, quick_demo):
+    told = json.loads(quick_demo.out)
+    calibration, diagnosis, report = map(
+        as_objects,
+        (call("calibrate", quick_demo.job / "measured", "--json").data, told["diagnosis"], told["report"]),
+    )
+    runs = tuple(read_plain(DemoCircle, run) for run in told["runs"])
+    result = DemoResult(quick_demo.job, runs, calibration, diagnosis, report, {})
+    monkeypatch.setattr(whole_job, "run_demo", lambda *_: result)
+    done = call("demo", "--quick", "--out", tmp_path / "demo")
+    assert done.code == 0, done.err
+    assert re.search(r"(?m)^mean +\d", done.out)
 
 
 def _does_the_whole_job(job, result, tests):

@@ -1,74 +1,29 @@
-"""What is released works without the checkout: the sdist builds the wheel, which does the whole job from an empty folder.
-
-The environment is new and takes only other packages from here; `python releasing.py try` installs them anew, too.
-"""
+"""What is released works without the checkout: the sdist builds the wheel, which does the whole job from an empty folder."""
 
 from __future__ import annotations
 
-import importlib.util
-import os
-import re
-import shutil
-import subprocess
-import sys
-import sysconfig
-import venv
+import json
 import zipfile
 from pathlib import Path
 
 import pytest
 
 import releasing
+from tests.released import BUILDS, installed, quick_demo, run, wheel
 
-CHECKOUT = Path(__file__).parents[2]
+__all__ = ["installed", "quick_demo", "wheel"]
+
 LARGEST_MB = 2.0
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(importlib.util.find_spec("pip") is None, reason="this environment has no pip to build with"),
+    pytest.mark.skipif(not BUILDS, reason="this environment has no pip to build with"),
 ]
-
-
-def pip(*arguments):
-    command = [sys.executable, "-m", "pip", *map(str, arguments), "--quiet", "--disable-pip-version-check"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
-    assert done.returncode == 0, done.stderr
-
-
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("wheel")
-    files = releasing.built(folder)
-    assert releasing.faults_of(files) == []
-    (built,) = folder.glob("dbbstation-*.whl")
-    return built
 
 
 def test_a_second_build_has_the_same_bytes(wheel, tmp_path):
     for again in releasing.built(tmp_path):
         assert again.read_bytes() == (wheel.parent / again.name).read_bytes()
-
-
-@pytest.fixture(scope="module")
-def installed(tmp_path_factory, wheel):
-    """Scripts of a new environment that has the wheel, and everything else from this environment."""
-    folder = tmp_path_factory.mktemp("environment")
-    venv.create(folder, with_pip=False)
-    paths = sysconfig.get_paths(vars={"base": str(folder), "platbase": str(folder)})
-    scripts, libraries = Path(paths["scripts"]), Path(paths["purelib"])
-    python = scripts / Path(sys.executable).name
-    pip("--python", python if python.exists() else scripts / "python", "install", "--no-deps", "--no-index", wheel)
-    # A folder that is named in a .pth is not itself searched for .pth files: the editable install here stays out.
-    (libraries / "libraries.pth").write_text(sysconfig.get_path("purelib") + "\n")
-    return scripts
-
-
-def run(installed, folder, *arguments, timeout_s=120):
-    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
-    command = [str(installed / arguments[0]), *map(str, arguments[1:])]
-    return subprocess.run(
-        command, capture_output=True, text=True, check=False, cwd=folder, env=environment, timeout=timeout_s
-    )
 
 
 def shipped(installed, folder, name):
@@ -108,19 +63,6 @@ def test_it_says_where_the_studies_are(installed, tmp_path):
     assert done.stderr.endswith("No such command 'study'; it is now `python -m studies` in a checkout\n")
 
 
-def keep_compiled(package):
-    """Give the package what was compiled of the checkout: its loops are the same to the letter, and are known by place, size and date."""
-    for made in (CHECKOUT / "dbbstation").rglob("__pycache__/*.nb[ci]"):
-        loops = made.parents[1] / f"{made.name.partition('.')[0]}.py"
-        if not loops.is_file():
-            continue  # compiled of a former state
-        installed = package / loops.relative_to(CHECKOUT / "dbbstation")
-        assert installed.read_bytes() == loops.read_bytes()
-        os.utime(installed, ns=(loops.stat().st_atime_ns, loops.stat().st_mtime_ns))
-        installed.with_name("__pycache__").mkdir(exist_ok=True)
-        shutil.copy(made, installed.with_name("__pycache__"))
-
-
 EVERYTHING = """
 import importlib, pkgutil, dbbstation
 for module in pkgutil.walk_packages(dbbstation.__path__, "dbbstation."):
@@ -138,9 +80,7 @@ def test_every_module_of_it_is_imported(installed, tmp_path):
     assert Path(place.strip()).is_relative_to(installed.parent)
 
 
-def test_it_does_the_whole_job(installed, tmp_path):
-    keep_compiled(shipped(installed, tmp_path, "protocols").parent)
-    done = run(installed, tmp_path, "dbbstation", "demo", "--quick", "--out", "demo", timeout_s=900)
-    assert done.returncode == 0, done.stderr
-    assert re.search(r"(?m)^mean +\d", done.stdout)
-    assert (tmp_path / "demo" / "report.html").is_file()
+def test_it_does_the_whole_job(quick_demo):
+    """Its numbers are looked at in tests/test_demo.py."""
+    assert (quick_demo.job / "report.html").is_file()
+    assert json.loads(quick_demo.out)["runs"]

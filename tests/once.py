@@ -13,7 +13,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import dbbstation
 from dbbstation.files.inputs import input_book, note_input, open_book
+
+try:
+    from cloudpickle import dumps  # comes with `distributed`; writes functions down, too
+except ImportError:
+    from pickle import dumps
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -68,11 +74,14 @@ def computed_once(factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, *t
     """Compute the answer of a task once for the same request and the same files; what a command prints and draws of it is not kept."""
     for task in tasks:
         module, _, name = task.rpartition(".")
-        patch.setattr(task, _kept(getattr(import_module(module), name), of_the_run(factory)))
+        kept = _kept(getattr(import_module(module), name), of_the_run(factory))
+        if module == f"dbbstation.tasks.{name}":  # the same under its public name
+            patch.setattr(dbbstation, name, kept)
+        patch.setattr(task, kept)
 
 
 _HERE: dict[Path, tuple[list[str], object, _Read]] = {}
-"""Answers that hold functions which were made on the way and cannot be written down: each worker computes them."""
+"""Answers that cannot be written down: each worker computes them."""
 
 
 def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
@@ -96,7 +105,7 @@ def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
                 read = dict(book._digests), book._read
                 _note_read(read)
                 try:
-                    place.write_bytes(pickle.dumps((told, answer, read)))
+                    place.write_bytes(dumps((told, answer, read)))
                 except (AttributeError, TypeError, pickle.PicklingError):
                     place.unlink(missing_ok=True)
                     _HERE[place] = told, answer, read
@@ -139,5 +148,20 @@ def _request(value: object) -> object:
         files = sorted(one for one in path.rglob("*") if one.is_file()) if path.is_dir() else [path]
         return path.name, [(str(one.relative_to(path)), hashlib.sha256(one.read_bytes()).hexdigest()) for one in files]
     if isinstance(value, dict):
-        return sorted((name, _request(one)) for name, one in value.items())
-    return [_request(one) for one in value] if isinstance(value, tuple | list) else value
+        return sorted((name, _request(one), _request(_named_by(name, one))) for name, one in value.items())
+    if isinstance(value, tuple | list):
+        return [_request(one) for one in value]
+    return value if isinstance(value, bool | int | float | str | Path | None) else _content(value)
+
+
+def _content(value: object) -> object:
+    """Hash of arrays, and of objects that hold any: their text leaves out all but the ends."""
+    try:
+        return hashlib.sha256(dumps(value)).hexdigest()
+    except (AttributeError, TypeError, pickle.PicklingError):
+        return value
+
+
+def _named_by(name: str, value: object) -> object:
+    """Folder of a simulator's file: the file names others that lie beside it."""
+    return Path(value).parent if name == "simulator" and isinstance(value, str | Path) else None

@@ -66,6 +66,7 @@ def decay(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("answers_kept")
 def test_the_drag_of_the_example_is_found_and_written(run, tmp_path):
     out, corrected, figure = (tmp_path / name for name in ("missing.py", "corrected.csv", "figure.svg"))
     outcome = run(*ASKED, "--no-held-out", "--json", "--out", out, "--table", corrected, "--figure", figure)

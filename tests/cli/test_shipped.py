@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shlex
+import shutil
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from dbbstation.cli.shipped import shipped_files
 from tests.cli.conftest import call
 from tests.cli.test_help import LINES, examples, found
+from tests.once import made_once
 
 QUICK = (
     "check",
@@ -74,11 +76,18 @@ def all_but_the_first_by_night(lines):
     return [line if first[line.split()[1]] == line else pytest.param(line, marks=pytest.mark.nightly) for line in lines]
 
 
+@pytest.fixture(scope="session")
+def written(tmp_path_factory):
+    def make(folder):
+        done = call("settings", "shipped", "examples", "--out", folder / "try")
+        assert done.code == 0
+
+    return made_once(tmp_path_factory, "shipped-examples", make) / "try"
+
+
 @pytest.fixture
-def folder(tmp_path):
-    done = call("settings", "shipped", "examples", "--out", tmp_path / "try")
-    assert done.code == 0
-    return tmp_path / "try"
+def folder(tmp_path, written):
+    return shutil.copytree(written, tmp_path / "try")
 
 
 def said(folder, line):

@@ -10,14 +10,16 @@ from pathlib import Path
 import pytest
 
 from tests.docs.notebooks import executed, printed
+from tests.once import OF_SESSIONS, OF_TABLES, computed_once
 
 NOTEBOOKS = sorted((Path(__file__).resolve().parents[2] / "docs").glob("*.ipynb"))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
-def test_the_notebook_prints_what_it_shows(notebook, tmp_path, monkeypatch):
+def test_the_notebook_prints_what_it_shows(notebook, tmp_path, tmp_path_factory, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    computed_once(tmp_path_factory, monkeypatch, *OF_SESSIONS, *OF_TABLES)
     shown = json.loads(notebook.read_text(encoding="utf-8"))
     code = [cell for cell in shown["cells"] if cell["cell_type"] == "code"]
     for before, now in zip(code, executed(shown), strict=True):

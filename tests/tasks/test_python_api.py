@@ -13,6 +13,7 @@ import pytest
 import dbbstation as dbb
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.session import read_session
+from tests.once import OF_SESSIONS, OF_TABLES, computed_once
 
 SMALL, MODEL = Path("fixtures/sessions/small"), Path("fixtures/models/small.yaml")
 PLAN = SMALL / "plan.yaml"
@@ -27,6 +28,14 @@ class Frame:
 
     def __getitem__(self, name):
         return self._columns[name]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def kept(tmp_path_factory):
+    """Calls that the notebook has, too, are answered once."""
+    with pytest.MonkeyPatch.context() as patch:
+        computed_once(tmp_path_factory, patch, *OF_SESSIONS, *OF_TABLES)
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -47,6 +47,7 @@ RATHER = {
     "diagnose": ["--sources", "gravity"],
     "identify": ["--no-held-out"],
     "mismatch": ["--no-held-out"],
+    "mismatch-simulator": ["--most-runs", "300"],
 }
 """What makes a long command short."""
 

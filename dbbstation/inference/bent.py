@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import permutations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,6 +32,58 @@ AT_ONCE = 0.5
 """Prior probability that the simulation contains the effect without delay; the residual is then the delayed minus the immediate effect."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """Rows of the laws, in time order within blocks; `size` is the prior standard deviation of an effect."""
+
+    time: Floats
+    time_unit: str
+    blocks: Sequence[slice]
+    size: float
+    unit: str
+
+    def per(self, variable: Variable) -> str:
+        """Return the unit of a slope over a variable."""
+        return f"{self.unit}/{variable.unit}" if variable.unit else self.unit
+
+    def law(
+        self,
+        family: Family,
+        over: tuple[Variable, ...],
+        columns: Callable[[tuple[float, ...]], Floats],
+        amplitudes: Sequence[tuple[str, str]],
+        members: int,
+        *shapes: tuple[str, str, tuple[float, ...]],
+        side: str = "",
+        plausible: Floats | None = None,
+        **further: Any,  # noqa: ANN401 - other fields
+    ) -> Law:
+        """Return a law over variables.
+
+        Args:
+            amplitudes: names and units.
+            members: number of laws that share the family's odds.
+            shapes: names, units and starting values of nonlinear parameters.
+        """
+        return Law(
+            name=f"{side}{family} of {' by '.join(v.name for v in over)}",
+            columns=columns,
+            plausible=np.full(len(amplitudes), self.size) if plausible is None else plausible,
+            parameters=(*(name for name, _ in amplitudes), *(name for name, _, _ in shapes)),
+            units=(*(unit for _, unit in amplitudes), *(unit for _, unit, _ in shapes)),
+            grids=tuple(grid for _, _, grid in shapes),
+            log_odds=log_odds(members) + float(np.log(0.5 * DEPARTS)) + odds_of_driven(over),
+            reach=self.size,
+            family=family,
+            variables=over,
+            **further,
+        )
+
+    def starts(self, count: int) -> list[tuple[str, str]]:
+        """Return the amplitudes of initial states."""
+        return [(f"start {k + 1}", self.unit) for k in range(count)]
+
+
 def memory_laws(
     variables: Sequence[Variable],
     time: Floats,
@@ -41,6 +93,7 @@ def memory_laws(
     unit: str,
 ) -> list[Law]:
     """Return laws with lag and dead time for each path variable."""
+    table = _Table(time, time_unit, blocks, size, unit)
     usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0 and v.is_path(blocks)]
     moving = [rows for rows in blocks if rows.stop - rows.start > 1]
     steps = [np.diff(time[rows]) for rows in moving]
@@ -55,25 +108,17 @@ def memory_laws(
     found = []
     for family, parameter, columns, grid in kinds:
         for variable in usable if grid else ():
-            gain = size / variable.half_range
             starts = starts_of(blocks) if family is Family.MEMORY else 0
             found.append(
-                Law(
-                    name=f"{family} of {variable.name}",
-                    columns=partial(columns, variable, time, blocks),
-                    plausible=np.array([gain, gain, *[size] * starts]),
-                    parameters=("gain", "gain", *(f"start {k + 1}" for k in range(starts)), parameter),
-                    units=(
-                        *(f"{unit}/{variable.unit}" if variable.unit else unit for _ in range(2)),
-                        *[unit] * starts,
-                        time_unit,
-                    ),
-                    grids=(grid,),
-                    log_odds=log_odds(len(usable)) + float(np.log(DEPARTS / len(kinds))) + odds_of_driven([variable]),
+                table.law(
+                    family,
+                    (variable,),
+                    partial(columns, variable, time, blocks),
+                    [("gain", table.per(variable))] * 2 + table.starts(starts),
+                    len(usable),
+                    (parameter, time_unit, grid),
+                    plausible=np.array([size / variable.half_range] * 2 + [size] * starts),
                     choices=_choices(2 + starts),
-                    reach=size,
-                    family=family,
-                    variables=(variable,),
                 )
             )
     return found
@@ -156,30 +201,23 @@ def bent_laws(
     Args:
         grows: result of `grows_with`, which distinguishes a limit from a dead zone.
     """
+    table = _Table(np.zeros(0) if time is None else time, time_unit, blocks, size, unit)
     usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0]
     bending = [v for v in usable if v.distinct >= DISTINCT]
     found = [
-        _bend(family, v, (grows or {}).get(v.name, 0.0), size, unit, len(bending))
+        _bend(table, family, v, (grows or {}).get(v.name, 0.0), len(bending))
         for family in (Family.SATURATION, Family.DEAD_ZONE)
         for v in bending
     ]
-    found += [_knee(side, v, size, unit, 2 * len(bending)) for side in ("upper", "lower") for v in bending]
+    found += [_knee(table, side, v, 2 * len(bending)) for side in ("upper", "lower") for v in bending]
     if time is None or any(np.any(np.diff(time[rows]) <= 0.0) for rows in blocks):
         return found
     paths = [v for v in usable if v.is_path(blocks)]
     turning = [v for v in paths if v.kind in TRAVELS and (v.range or np.ptp(v.directions(blocks)) > 0.0)]
-    rate = {v.name: v.rates(time, blocks) for v in turning}
-    found += [
-        _with_width(
-            f"{Family.FRICTION} of {v.name}", Family.FRICTION, v, partial(_friction, rate[v.name]),
-            tuple(share * float(np.abs(rate[v.name]).max()) for share in SPEEDS),
-            (("size", unit, ""),), ("turns over within", f"{v.unit or v.name}/{time_unit}"), size, len(turning),
-        )
-        for v in turning
-    ]  # fmt: skip
-    found += [_integral(v, time, time_unit, blocks, size, unit, len(usable)) for v in usable]
+    found += [_friction(table, v, len(turning)) for v in turning]
+    found += [_integral(table, v, len(usable)) for v in usable]
     pairs = [(a, b) for a, b in permutations(usable, 2) if a in turning and b.kind in SCALES_WITH]
-    return found + [_scaled(a, b, blocks, size, unit, len(pairs)) for a, b in pairs]
+    return found + [_scaled(table, a, b, len(pairs)) for a, b in pairs]
 
 
 def grows_with(variables: Sequence[Variable], simulated: Floats, size: float) -> dict[str, float]:
@@ -213,7 +251,7 @@ def is_same(one: Floats, other: Floats) -> bool:
     return abs(float(np.corrcoef(one, other)[0, 1])) > 1.0 - SAME
 
 
-def _bend(family: Family, variable: Variable, grows: float, size: float, unit: str, members: int) -> Law:
+def _bend(table: _Table, family: Family, variable: Variable, grows: float, members: int) -> Law:
     """Return saturation or dead zone, according to the simulated value's growth with a variable."""
     # A limit and a dead zone of one width add up to a straight line. If the simulation contains this line, an object
     # with a limit lacks the part beyond the width, and an object with a dead zone lacks the part within. The sign
@@ -221,12 +259,12 @@ def _bend(family: Family, variable: Variable, grows: float, size: float, unit: s
     # Centred at zero if it has both signs, else at mid-range.
     middle = 0.0 if variable.low < 0.0 < variable.high else 0.5 * (variable.low + variable.high)
     values, largest = variable.values - middle, max(variable.high - middle, middle - variable.low)
-    slope = f"{unit}/{variable.unit}" if variable.unit else unit
+    unit, slope, dead = table.unit, table.per(variable), family is Family.DEAD_ZONE
 
     def columns(point: tuple[float, ...]) -> Floats:
         width = min(point[0], WIDEST * largest)
         within = np.clip(values, -width, width)
-        if family is Family.DEAD_ZONE:
+        if dead:
             return np.column_stack([values - within, -within] if grows else [values - within]) * (grows or 1.0)
         smooth = np.tanh(values / point[0])
         limits = [smooth, within / width]
@@ -239,7 +277,7 @@ def _bend(family: Family, variable: Variable, grows: float, size: float, unit: s
             ("slope beyond", slope, "which the simulation lacks"),
             ("slope within", slope, "which the simulation has straight"),
         )
-        if family is Family.DEAD_ZONE
+        if dead
         else (
             ("limit", unit, "rounded"),
             ("limit", unit, "sharp"),
@@ -247,54 +285,37 @@ def _bend(family: Family, variable: Variable, grows: float, size: float, unit: s
             ("slope", slope, "rounded, which the simulation has straight"),
         )
     )
-    own = names if grows else names[: 1 if family is Family.DEAD_ZONE else 2]
-    width = ("half width" if family is Family.DEAD_ZONE else "turns over within", variable.unit)
-    grid = tuple(share * largest for share in WIDTHS[family])
-    law = _with_width(f"{family} of {variable.name}", family, variable, columns, grid, own, width, size, members)
-    return replace(law, positive=(True,)) if grows else law
+    own = names if grows else names[: 1 if dead else 2]
+    width = "half width" if dead else "turns over within"
+    return table.law(
+        family,
+        (variable,),
+        columns,
+        [(name, per) for name, per, _ in own],
+        members,
+        (width, variable.unit, tuple(share * largest for share in WIDTHS[family])),
+        choices=one_of([label for _, _, label in own]) if len(own) > 1 else (),
+        positive=(True,) if grows else (),
+    )
 
 
-def _knee(side: str, variable: Variable, size: float, unit: str, members: int) -> Law:
+def _knee(table: _Table, side: str, variable: Variable, members: int) -> Law:
     def columns(point: tuple[float, ...]) -> Floats:
         beyond = variable.values - point[0]
         return (np.maximum(beyond, 0.0) if side == "upper" else np.minimum(beyond, 0.0))[:, None]
 
-    slope = f"{unit}/{variable.unit}" if variable.unit else unit
-    grid = tuple(variable.low + share * variable.extent for share in KNEES)
-    return _with_width(
-        f"{side} {Family.KNEE} of {variable.name}", Family.KNEE, variable, columns, grid, (("slope beyond", slope, ""),),
-        ("knee", variable.unit), size, members,
-    )  # fmt: skip
+    shape = "knee", variable.unit, tuple(variable.low + share * variable.extent for share in KNEES)
+    slope = [("slope beyond", table.per(variable))]
+    return table.law(Family.KNEE, (variable,), columns, slope, members, shape, side=f"{side} ")
 
 
-def _friction(rate: Floats, point: tuple[float, ...]) -> Floats:
-    return np.tanh(rate / point[0])[:, None]
-
-
-def _with_width(
-    name: str,
-    family: Family,
-    variable: Variable,
-    columns: Callable[[tuple[float, ...]], Floats],
-    grid: tuple[float, ...],
-    amplitudes: Sequence[tuple[str, str, str]],
-    width: tuple[str, str],
-    size: float,
-    members: int,
-) -> Law:
-    choices = one_of([label for _, _, label in amplitudes])
-    return Law(
-        name=name,
-        columns=columns,
-        plausible=np.full(len(amplitudes), size),
-        parameters=(*(one for one, _, _ in amplitudes), width[0]),
-        units=(*(unit for _, unit, _ in amplitudes), width[1]),
-        grids=(grid,),
-        log_odds=_log_odds(members, variable),
-        choices=choices if len(choices) > 1 else (),
-        reach=size,
-        family=family,
-        variables=(variable,),
+def _friction(table: _Table, variable: Variable, members: int) -> Law:
+    rate = variable.rates(table.time, table.blocks)
+    grid = tuple(share * float(np.abs(rate).max()) for share in SPEEDS)
+    shape = "turns over within", f"{variable.unit or variable.name}/{table.time_unit}", grid
+    size = [("size", table.unit)]
+    return table.law(
+        Family.FRICTION, (variable,), lambda point: np.tanh(rate / point[0])[:, None], size, members, shape
     )
 
 
@@ -311,18 +332,11 @@ def integral_of(values: Floats, time: Floats, blocks: Sequence[slice]) -> Floats
     return found
 
 
-def _integral(
-    variable: Variable,
-    time: Floats,
-    time_unit: str,
-    blocks: Sequence[slice],
-    size: float,
-    unit: str,
-    members: int,
-) -> Law:
+def _integral(table: _Table, variable: Variable, members: int) -> Law:
     """Return a law for accumulating quantities, such as mass or heat, with each run's initial value."""
     # The balanced value of a signal is seldom zero (outflow, bias, room temperature), so the law includes a linear
     # drift.
+    time, blocks = table.time, table.blocks
     starts = starts_of(blocks) if len(blocks) > 1 else 0
     middle = 0.5 * (variable.low + variable.high)
     travel = np.concatenate([variable.travel(rows) for rows in blocks])
@@ -331,37 +345,15 @@ def _integral(
     samples[:, 1] = integral_of(np.ones(len(time)), time, blocks)
     for k, rows in enumerate(blocks if starts else ()):
         samples[rows, 2 + (k if starts > 1 else 0)] = 1.0
-    return Law(
-        name=f"{Family.INTEGRAL} of {variable.name}",
-        columns=lambda _point: samples,
-        plausible=np.full(2 + starts, size),
-        parameters=("rate", "drift", *(f"start {k + 1}" for k in range(starts))),
-        units=(f"{unit}/({variable.unit or variable.name} {time_unit})", f"{unit}/{time_unit}", *[unit] * starts),
-        log_odds=_log_odds(members, variable),
-        zero_from=middle,
-        reach=size,
-        family=Family.INTEGRAL,
-        variables=(variable,),
-    )
+    rate = f"{table.unit}/({variable.unit or variable.name} {table.time_unit})"
+    amplitudes = [("rate", rate), ("drift", f"{table.unit}/{table.time_unit}"), *table.starts(starts)]
+    return table.law(Family.INTEGRAL, (variable,), lambda _: samples, amplitudes, members, zero_from=middle)
 
 
-def _log_odds(members: int, *over: Variable) -> float:
-    return log_odds(members) + float(np.log(0.5 * DEPARTS)) + odds_of_driven(over)
-
-
-def _scaled(one: Variable, by: Variable, blocks: Sequence[slice], size: float, unit: str, members: int) -> Law:
-    turned = [one.directions(blocks), *(within(one.values, blocks, share * one.extent) for share in TRANSITS[:-1])]
+def _scaled(table: _Table, one: Variable, by: Variable, members: int) -> Law:
+    turned = [one.directions(table.blocks)]
+    turned += [within(one.values, table.blocks, share * one.extent) for share in TRANSITS[:-1]]
     labels = ("at once", *(f"over {share * one.extent:.3g} {one.unit}".strip() for share in TRANSITS[:-1]))
     samples = np.column_stack(turned) * by.values[:, None]
-    return Law(
-        name=f"{Family.SCALED} of {one.name} by {by.name}",
-        columns=lambda _point: samples,
-        plausible=np.full(len(labels), size),
-        parameters=("size per unit",) * len(labels),
-        units=(f"{unit}/{by.unit}" if by.unit else unit,) * len(labels),
-        log_odds=_log_odds(members, one, by),
-        choices=one_of(labels),
-        reach=size,
-        family=Family.SCALED,
-        variables=(one, by),
-    )
+    sizes = [("size per unit", table.per(by))] * len(labels)
+    return table.law(Family.SCALED, (one, by), lambda _: samples, sizes, members, choices=one_of(labels))

@@ -365,19 +365,6 @@ class Spreads:
 
 
 @dataclass(frozen=True, eq=False)
-class Directions:
-    """Directions of scaled fitted columns, most certain first.
-
-    Attributes:
-        singular: reciprocal standard deviations, shape (f,).
-        vectors: orthonormal rows, shape (f, f).
-    """
-
-    singular: Floats
-    vectors: Floats
-
-
-@dataclass(frozen=True, eq=False)
 class Solution:
     """Result of `solve`.
 
@@ -484,8 +471,8 @@ def chi2_without(
 def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> Floats:
     """Return orthonormal directions, in scaled columns, with standard deviations above 1."""
     arrow = arrow_of(blocks, known, noise)
-    directions = directions_of(arrow.root_of_fitted * known.scale[arrow.fitted])
-    return directions.vectors[directions.singular < 1.0 - ROUNDING]
+    _, singular, vectors = np.linalg.svd(arrow.root_of_fitted * known.scale[arrow.fitted])
+    return vectors[singular < 1.0 - ROUNDING]
 
 
 def unseen_combinations(blocks: Sequence[Block], known: Columns, noise: float, held: Floats) -> Floats:
@@ -501,14 +488,6 @@ def unseen_combinations(blocks: Sequence[Block], known: Columns, noise: float, h
         orthonormal, _ = np.linalg.qr(held.T + free.T @ follow)
         combinations[:, fitted] = orthonormal.T * known.scale[fitted]
     return combinations
-
-
-def directions_of(seen: Floats) -> Directions:
-    """Return directions of a scaled root of information, shape (r, f), most certain first."""
-    _, singular, vectors = np.linalg.svd(seen, full_matrices=True)
-    padded = np.zeros(seen.shape[1])
-    padded[: len(singular)] = singular
-    return Directions(padded, vectors)
 
 
 def complement(rows: Floats) -> Floats:

@@ -132,7 +132,6 @@ class _How:
     """Options of a comparison; fields before `progress` are options of `settle`."""
 
     look: bool = True
-    static: bool = True
     most_expanded: int = BOUNDS.expanded_of_table
     most_looks: int = BOUNDS.looks
     in_time: bool = True
@@ -158,16 +157,16 @@ def settle(
     Args:
         rivals: whether noise with any spectrum competes; False for first-order noise, estimated with all causes.
         most_work: limit of all searches together, see `SearchWork`.
-        options: `look`: search waves, bumps, steps and pulses. `static`: include patterns that need no search.
-            `most_expanded`: limit of one search. `most_looks`: number of successive scans of the residual. `in_time`:
-            search steps and pulses in time; False if blocks have separate curves. `thorough`: several starts and a
-            final scan; False for one fast search. `progress`: called with each stage.
+        options: `look`: search waves, bumps, steps and pulses. `most_expanded`: limit of one search. `most_looks`: number
+            of successive scans of the residual. `in_time`: search steps and pulses in time; False if blocks have separate
+            curves. `thorough`: several starts and a final scan; False for one fast search. `progress`: called with each
+            stage.
     """
     how, stages = _How(**options, work=SearchWork(most_work)), len(beginnings) + 1
     if not rivals:
-        return _settled(_begun(channel, how), how)
+        return _settled(_begun(channel), how)
     found: list[Settled] = []
-    laid_out = _begun(channel, how)
+    laid_out = _begun(channel)
     begun: tuple[Bank, Settled] | None = None
     # Long tails come last, and only if innovations may have them.
     for number, one in enumerate(sorted(beginnings, key=lambda one: one in LONG_TAILS)):
@@ -232,11 +231,9 @@ def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
     return tuple(found)
 
 
-def _begun(channel: Channel, how: _How) -> Bank:
+def _begun(channel: Channel) -> Bank:
     bank = Bank(channel)
-    if how.static:
-        ready = channel.static
-        bank.add(static_patterns(channel) if ready is None else ready)
+    bank.add(static_patterns(channel) if channel.static is None else channel.static)
     return bank
 
 

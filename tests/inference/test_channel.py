@@ -244,7 +244,7 @@ def test_a_law_that_is_not_proportional_to_its_amplitude_is_laid_out_about_it() 
         return (0.3 * np.tanh(amplitudes[0] * share) / amplitudes[0])[:, None]
 
     law = Law("saturation", lambda _: 0.3 * share[:, None], np.array([1.0]), ("size",), ("",), at=about)
-    found = there(read_by_levels(settle(channel(data, (law,)), look=False, static=False)))["saturation"]
+    found = there(read_by_levels(settle(replace(channel(data, (law,)), static=()), look=False)))["saturation"]
     assert found.values["size"].value == pytest.approx(2.0, rel=0.1)
 
 
@@ -283,6 +283,6 @@ def test_what_two_formulas_may_be_off_by_is_not_decided_between_them(
             ("slope and a little more", data.q + 0.03 * other * np.linalg.norm(q) / np.linalg.norm(other)),
         )
     ]
-    settled = settle(channel(data, tuple(laws)), look=False, static=False)
+    settled = settle(replace(channel(data, tuple(laws)), static=()), look=False)
     findings = {finding.name: finding for finding in read_by_levels(settled)}
     assert findings["slope"].equivalent == alike

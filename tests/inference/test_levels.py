@@ -211,7 +211,7 @@ def test_slow_noise_conceals_nothing_that_the_base_does_not_take(rng):
     )
     base = Base.flat(("offset",), np.ones((800, 1)))
     whole = Channel(slow, "mm", (slice(0, 800),), ("run",), (), base, laws, time=rows)
-    settled = settle(whole, look=False, static=False, beginnings=(Beginning.NOTHING,))
+    settled = settle(replace(whole, static=()), look=False, beginnings=(Beginning.NOTHING,))
     assert settled.noise.correlation_samples > 5.0
     found = {one.follows: one.concealed for one in detectable_causes(settled)}
     assert found == pytest.approx({"wave": 0.0, "constant": 1.0}, abs=0.02)
@@ -397,9 +397,9 @@ def test_a_spent_search_that_meets_an_earlier_outcome_is_judged_in_its_columns(r
         (law,),
         time=np.arange(400.0),
     )
-    first = settle(whole, look=False, static=False, beginnings=(Beginning.NOTHING,))
+    first = settle(replace(whole, static=()), look=False, beginnings=(Beginning.NOTHING,))
     monkeypatch.setattr(settling, "_meets", lambda *_: True)
-    how = settling._How(look=False, static=False, work=SearchWork(1.0))
+    how = settling._How(look=False, work=SearchWork(1.0))
     spent = settling._from(Bank(whole), (), Beginning.NOTHING, how, [first])
     assert first.best.members[0].columns.max() >= Bank(whole).count
     assert spent.stopped

@@ -57,13 +57,13 @@ class SearchOutcome:
 
 def compared(channel: Channel, progress: Callable[[str], None] = lambda _: None) -> Settled:
     """Compare all candidates, with all initial noise models."""
-    return settle(channel, look=False, static=False, progress=progress)
+    return settle(channel, look=False, progress=progress)
 
 
 def compared_quickly(channel: Channel, beginning: Beginning) -> Settled:
     """Compare quickly from one start, which may miss large effects."""
     beginnings = tuple(dict.fromkeys((beginning, Beginning.EVERYTHING)))
-    return settle(channel, look=False, static=False, most_expanded=0, thorough=False, beginnings=beginnings)
+    return settle(channel, look=False, most_expanded=0, thorough=False, beginnings=beginnings)
 
 
 def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, refits: bool = True) -> SearchOutcome:

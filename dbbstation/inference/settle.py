@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -104,7 +105,7 @@ class Settled(Outcome):
         effect = self.effect()
         return effect + self.channel.base.samples @ self.base_values(effect)
 
-    @property
+    @cached_property
     def left(self) -> Floats:
         """Return the residual beside the members, over all rows, shape (n,)."""
         return self.channel.residual - self.predicted()

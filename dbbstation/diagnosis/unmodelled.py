@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.fft import next_fast_len
 from scipy.linalg import qr
-from scipy.sparse import csr_array
 
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.diagnosis.parts import ALIKE
@@ -36,13 +35,10 @@ from dbbstation.inference.looks import Sums, bumps, peaks, steps
 from dbbstation.inference.model_comparison import Cause, Variant, all_columns
 from dbbstation.inference.patterns import FAMILY_ODDS
 from dbbstation.inference.square_root import free_directions, with_random
-from dbbstation.inference.triangle import products_of_rows
 from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
-
-    from numpy.typing import NDArray
 
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.computing.arrays import Floats, Integers
@@ -149,25 +145,7 @@ class TemplateScan:
         if strut is not None:
             gain = gain[:, strut - 1 : strut]
             values = values[:, strut - 1] if variable in OF_STRUTS else values
-        gain = gain * (PLAUSIBLE_MM / self._noise)
-        own, piece, number = np.unique(pieces(values), return_inverse=True, return_counts=True)
-        many, directions = len(values), gain.shape[1]
-        rows = np.argsort(piece, kind="stable")
-        ends = np.concatenate([[0], np.cumsum(number)])
-
-        def added(samples: NDArray[np.floating], times: Floats | None = None) -> Floats:
-            """Return sums over bins of samples times factors."""
-            weights = np.ones(many) if times is None else times[rows]
-            return csr_array((weights, rows, ends), shape=(len(number), many)) @ samples
-
-        at = added(values.reshape(many, -1)) / number[:, None]
-        return Sums(
-            at=at[:, 0] if values.ndim == 1 else at,
-            place=own - own[0],
-            rest=added(gain * self._rest[:, None]),
-            gains=added(products_of_rows(gain, gain)).reshape(-1, directions, directions),
-            base=np.stack([added(self._base, gain[:, d]) for d in range(directions)], axis=1),
-        )
+        return Sums.of(values, pieces(values), gain * (PLAUSIBLE_MM / self._noise), self._rest, self._base)
 
 
 def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import rfft
+from scipy.sparse import csr_array
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Kind, Variable
@@ -19,6 +20,7 @@ from dbbstation.inference.forms import HARMONICS, Bump, Form, Spline, StepForm, 
 from dbbstation.inference.patterns import CURVES, Family, Pattern, log_odds
 from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.stretches import refined, stretches
+from dbbstation.inference.triangle import products_of_rows
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterable, Sequence
@@ -50,6 +52,35 @@ class Sums:
     rest: Floats
     gains: Floats
     base: Floats
+
+    @classmethod
+    def of(cls, values: Floats, piece: Integers, gain: Floats, rest: Floats, base: NDArray[np.floating]) -> Sums:
+        """Return sums over bins.
+
+        Args:
+            values: of the variable, shape (n,) or (n, c).
+            piece: number of each row's bin, shape (n,).
+            gain: shape (n, d).
+            rest: residual, shape (n,).
+            base: directions, shape (n, k).
+        """
+        own, place, count = np.unique(piece, return_inverse=True, return_counts=True)
+        many, directions = gain.shape
+        rows, ends = np.argsort(place, kind="stable"), np.concatenate([[0], np.cumsum(count)])
+
+        def added(samples: NDArray[np.floating], times: Floats | None = None) -> Floats:
+            """Return sums over bins of samples times factors."""
+            weights = np.ones(many) if times is None else times[rows]
+            return csr_array((weights, rows, ends), shape=(len(count), many)) @ samples
+
+        at = added(values.reshape(many, -1)) / count[:, None]
+        return cls(
+            at=at[:, 0] if values.ndim == 1 else at,
+            place=own - own[0],
+            rest=added(gain * rest[:, None]),
+            gains=added(products_of_rows(gain, gain)).reshape(-1, directions, directions),
+            base=np.stack([added(base, gain[:, d]) for d in range(directions)], axis=1),
+        )
 
     @cached_property
     def scaled(self) -> tuple[Floats, float, float]:
@@ -259,21 +290,13 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: Flags, size: flo
 
 def _sums(left: Left, values: Floats, pieces: int, size: float) -> Sums:
     low, high = float(values.min()), float(values.max())
-    place = np.minimum(((values - low) / max(high - low, 1e-300) * pieces).astype(np.int64), pieces - 1)
-    own, number, count = np.unique(place, return_inverse=True, return_counts=True)
-    order = np.argsort(number, kind="stable")
-    starts = np.concatenate([[0], np.cumsum(count)[:-1]])
-
-    def added(rows: Floats) -> Floats:
-        return np.add.reduceat(rows[order], starts, axis=0)
-
-    squares, base = np.asarray(count * size**2, dtype=np.float64), size * added(left.beside)
-    if left.whitening is not None:
-        # Whitening reduces a curve according to its rate of change; the first scan assumes the noise's factor.
-        squares, base = squares * (left.coloured.innovation / left.coloured.sigma) ** 2, base[:, :0]
-    return Sums(
-        added(values) / count, own, size * added(left.towards)[:, None], squares[:, None, None], base[:, None, :]
-    )
+    piece = np.minimum(((values - low) / max(high - low, 1e-300) * pieces).astype(np.int64), pieces - 1)
+    gain = np.full((len(values), 1), size)
+    if left.whitening is None:
+        return Sums.of(values, piece, gain, left.towards, left.beside)
+    found = Sums.of(values, piece, gain, left.towards, left.beside[:, :0])
+    # Whitening reduces a curve according to its rate of change; the first scan assumes the noise's factor.
+    return replace(found, gains=found.gains * (left.coloured.innovation / left.coloured.sigma) ** 2)
 
 
 def _waves(

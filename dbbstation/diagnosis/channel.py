@@ -225,7 +225,7 @@ class CircleChannel:
         effects = [
             Effects(motion, reading, values[own], derivative, known)
             for motion, reading, own, derivative, known in zip(
-                self.motions, readings, shared, derivatives, self._variables, strict=True
+                self.motions, readings, shared, derivatives, self.variables, strict=True
             )
         ]
         least_mm = LEAST_SLACK * max(self.first_noise_mm, SMALLEST_NOISE_MM) / MOST_SLACK
@@ -254,7 +254,8 @@ class CircleChannel:
         )
 
     @cached_property
-    def _variables(self) -> list[dict[str, Floats]]:
+    def variables(self) -> list[dict[str, Floats]]:
+        """Return every run's variables."""
         return [variables(motion, self.machine) for motion in self.motions]
 
     @cached_property

@@ -28,7 +28,7 @@ from dbbstation.sources.laws.motion import since_turning
 from dbbstation.sources.laws.temperature import FOLLOWED_K, known_thermometers, logged_degc
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Frames, Machine
@@ -287,13 +287,16 @@ def _temperatures(motion: Motion) -> dict[str, Floats]:
     return found
 
 
-def samples_of(motion: Motion, machine: Machine, reading: BarReading, pivot_mm: Floats | None = None) -> Samples:
+def samples_of(
+    every: Mapping[str, Floats], motion: Motion, machine: Machine, reading: BarReading, pivot_mm: Floats | None = None
+) -> Samples:
     """Return variables and gains of a run.
 
     Args:
+        every: `variables` of the motion.
         pivot_mm: of table rotation, shape (3,); None for no rotation.
     """
-    known = {name: values[motion.kept] for name, values in variables(motion, machine).items()}
+    known = {name: values[motion.kept] for name, values in every.items()}
     gain = {
         EVERY: reading.by_parameters(Effect(strut_mm=np.eye(STRUTS))),
         READING: np.ones((len(reading.length_mm), 1)),

@@ -264,8 +264,8 @@ class Unmodelled:
         channel = self.channel
         pivot = np.mean([observation.setup.fixed_ball_mm for observation in channel.observations], axis=0)
         self.runs = [
-            samples_of(motion, channel.machine, reading, pivot)
-            for motion, reading in zip(channel.motions, channel.readings, strict=True)
+            samples_of(known, motion, channel.machine, reading, pivot)
+            for known, motion, reading in zip(channel.variables, channel.motions, channel.readings, strict=True)
         ]
         self._add([*shapes(ranges(self.runs)), *wander(self.runs)])
 

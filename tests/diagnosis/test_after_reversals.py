@@ -11,7 +11,7 @@ from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.diagnose import thinned
 from dbbstation.diagnosis.explain import SettledCircles
 from dbbstation.diagnosis.locate import after_reversals
-from dbbstation.diagnosis.shapes import samples_of
+from dbbstation.diagnosis.shapes import samples_of, variables
 from dbbstation.tasks.load import load_sessions
 from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.disturbances import BumpedJig, RingingStrut
@@ -34,7 +34,10 @@ def looked_at(folder):
     runs = [thinned(one) for one in recorded.observations]
     fit = calibrate(recorded.machine, runs)
     motions = [one.motion() for one in runs]
-    return after_reversals([samples_of(m, recorded.machine, fit.model.bar(m)) for m in motions], fit.residual_mm)
+    return after_reversals(
+        [samples_of(variables(m, recorded.machine), m, recorded.machine, fit.model.bar(m)) for m in motions],
+        fit.residual_mm,
+    )
 
 
 @pytest.mark.parametrize(

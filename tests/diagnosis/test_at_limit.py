@@ -144,7 +144,10 @@ def test_a_curve_that_all_struts_follow_has_the_points_of_one_variable(tmp_path)
     record(tmp_path / "s", seed=1, mechanisms=[], rate_hz=4.0)
     recorded = load_sessions([tmp_path / "s"])
     channel = CircleChannel(calibrate(recorded.machine, recorded.observations), ())
-    runs = [samples_of(m, channel.machine, r) for m, r in zip(channel.motions, channel.readings, strict=True)]
+    runs = [
+        samples_of(v, m, channel.machine, r)
+        for v, m, r in zip(channel.variables, channel.motions, channel.readings, strict=True)
+    ]
     alike = [s for s in shapes(ranges(runs)) if s.variable in {"strut-length", "strut-force"} and s.strut is None]
     assert {s.variable for s in alike} == {"strut-length", "strut-force"}
     for shape in alike:

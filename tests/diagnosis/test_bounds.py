@@ -81,7 +81,10 @@ def test_contacts_that_stiffen_under_load_call_in_no_second_cause(tmp_path):
 def test_a_pull_towards_a_place_is_what_statics_says(tmp_path):
     clean = load_sessions([_still(tmp_path / "clean")])
     channel = CircleChannel(calibrate(clean.machine, clean.observations), ())
-    runs = [samples_of(m, channel.machine, r) for m, r in zip(channel.motions, channel.readings, strict=True)]
+    runs = [
+        samples_of(v, m, channel.machine, r)
+        for v, m, r in zip(channel.variables, channel.motions, channel.readings, strict=True)
+    ]
     every = shapes(ranges(runs))
     assert {s.form.about for s in every if isinstance(s.form, Spring)} == {AWAY_MM}
     hose = load_sessions([_still(tmp_path / "hose", HoseDrag(40.0, anchor_mm=(230.0, 870.0, -600.0)))])

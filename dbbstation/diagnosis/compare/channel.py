@@ -22,7 +22,7 @@ from dbbstation.diagnosis.parts import (
     parts_of,
     variable_of,
 )
-from dbbstation.diagnosis.shapes import EVERY, READING, SIGNED, UNITS, ranges, samples_of, shapes, variables
+from dbbstation.diagnosis.shapes import EVERY, READING, SIGNED, UNITS, ranges, samples_of, shapes
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.channel import NAMED_ODDS, Channel, Kind, Law, Variable
 from dbbstation.inference.forms import LinearSplines, Lobes, SignForm
@@ -216,10 +216,11 @@ class Change:
 
     def _slack(self, side: int, point: tuple[float, ...], amplitudes: Floats) -> Floats:
         runs, sides = [], self.sides
-        for group, motion, reading in zip(self._groups, sides.motions[side], sides.readings[side], strict=True):
+        every = zip(self._groups, sides.motions[side], sides.readings[side], sides.variables[side], strict=True)
+        for group, motion, reading, known in every:
             values = self._values(point, amplitudes, group)
             derivative = reading.by_source(self.source, sides.machine, values)
-            runs.append(Effects(motion, reading, values, derivative, variables(motion, sides.machine)))
+            runs.append(Effects(motion, reading, values, derivative, known))
         found = np.hstack([of(self.source, sides.machine, runs) for of in (discrepancy_of, left_open_of)])
         return sides.averaged(side, np.split(found, np.cumsum([len(run.derivative) for run in runs])[:-1]))
 
@@ -309,8 +310,8 @@ def samples_of_b(sides: Sides) -> list[Samples]:
     """Return samples of B's runs with A's balls, for shapes."""
     pivot = np.mean([pair.circle.ball_mm for pair in sides.pairs], axis=0)
     return [
-        samples_of(motion, sides.machine, reading, pivot)
-        for motion, reading in zip(sides.motions[1], sides.readings[1], strict=True)
+        samples_of(known, motion, sides.machine, reading, pivot)
+        for known, motion, reading in zip(sides.variables[1], sides.motions[1], sides.readings[1], strict=True)
     ]
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.shapes import variables
 from dbbstation.errors import TraceError
 from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.inference.bounds import BOUNDS
@@ -253,6 +254,12 @@ class Sides:
         model = MachineModel(self.machine)
         a, b = ([model.bar(motion) for motion in motions] for motions in self.motions)
         return tuple(a), tuple(b)
+
+    @cached_property
+    def variables(self) -> tuple[list[dict[str, Floats]], list[dict[str, Floats]]]:
+        """Return variables along the paths of A and B."""
+        a, b = ([variables(motion, self.machine) for motion in motions] for motions in self.motions)
+        return a, b
 
     @cached_property
     def blocks(self) -> tuple[slice, ...]:

@@ -26,10 +26,9 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.folds import (
     HeldOut,
     columns_of,
+    errors_without,
     gains_of_tests,
     groups_of_tests,
-    held_out,
-    in_turn,
     numbered,
     rows_of_groups,
     selection_frequency,
@@ -98,10 +97,9 @@ def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out
     stopped = explained.settled.stopped
     outcome = outcome_of(explained)
     gains = without_tests(explained, outcome) if hold_out and not stopped else None
-    anew = None if gains is None else gains.anew
     levels = circle_levels(explained, outcome, gains)
     explained = _widened(explained)
-    findings = judge(explained, outcome, anew, levels)
+    findings = judge(explained, outcome, gains, levels)
     settled, before, outliers = explained.settled, explained.before, explained.outliers
     after, members = settled.after, settled.members
     rivals = [f.name for f in sorted(findings, key=lambda f: -(f.gain or 0.0))[: BOUNDS.found_again]]
@@ -119,7 +117,7 @@ def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out
         before=before,
         after=after,
         held_out=held_out,
-        chosen_anew=anew,
+        held_out_worse=None if gains is None else gains.is_worse,
         levels=levels,
         outliers=tuple(beside(outlier, after) for outlier in outliers),
         workspace=elsewhere,
@@ -239,32 +237,18 @@ def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
     channel, settled = explained.channel, explained.settled
     noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
     single = max(_single_noise_mm(channel.observations, noise_mm, fine_noise_mm(settled.after)), SMALLEST_NOISE_MM)
-    having = _held_out(explained, settled.members, single=single)
-    return having(settled.members), having(())
+    without = _errors(explained, settled.members, single)
+    return without([member.name for member in settled.members]), without(())
 
 
-def predicted_without(explained: Explained, left_out: Sequence[Collection[str]]) -> list[float]:
-    """Return the rms error of held-out tests [mm] after omitting each set of causes; a displaced ball stays in its test."""
-    members = [m for m in explained.settled.best.members if not m.cause.setup]
-    having = _held_out(explained, members)
-    return [having([m for m in members if m.name in names]).rms for names in left_out]
-
-
-def _held_out(
+def _errors(
     explained: Explained, members: Sequence[Member], single: float | None = None
-) -> Callable[[Sequence[Member]], HeldOut]:
-    """Return a function that predicts held-out tests with all members but some."""
+) -> Callable[[Collection[str]], HeldOut]:
     channel, settled, variants = explained.channel, explained.settled, [member.variant for member in members]
-    known, base = channel.known_with(variants), len(channel.base.prior)
     blocks = channel.blocks(all_columns(variants), channel.target(settled.after))
-    groups = in_turn([o.test for o in channel.observations], BOUNDS.folds_of_an_error)
-
-    def but_for(some: Sequence[Member]) -> HeldOut:
-        out = np.concatenate([np.zeros(base, dtype=bool), *(np.full(m.width, m in some) for m in members)])
-        noise_mm, kept = max(settled.noise_mm, SMALLEST_NOISE_MM), np.flatnonzero(~out)
-        return held_out(blocks, groups, known, kept, base, noise_mm, channel.held, single)
-
-    return but_for
+    tests, widths = [o.test for o in channel.observations], {member.name: member.width for member in members}
+    noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
+    return errors_without(blocks, tests, channel.known_with(variants), widths, noise_mm, channel.held, single)
 
 
 def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
@@ -273,10 +257,12 @@ def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
     The reference is the kinematic calibration of the same tests.
     """
     channel = explained.channel
+    # A displaced ball stays in its test.
+    members = [member for member in explained.settled.best.members if not member.cause.setup]
     return gains_of_tests(
         outcome,
         rows_of_groups(groups_of_tests([o.test for o in channel.observations]), channel.runs),
-        partial(predicted_without, explained),
+        partial(_errors, explained, members),
         lambda cause: cause.named,
         most_members=BOUNDS.members,
         likely=BOUNDS.close,

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.diagnosis.effects import WorkspaceError
     from dbbstation.inference.alternatives import Cancelling
-    from dbbstation.inference.folds import ChosenAnew, HeldOut
+    from dbbstation.inference.folds import HeldOut
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.levels import Levels, LimitReached
 
@@ -203,7 +203,7 @@ class Diagnosis:
 
     Attributes:
         held_out: prediction errors before and after [mm].
-        chosen_anew: gains with selection repeated without each group; None without causes or for few tests.
+        held_out_worse: whether selections without each group of tests predict it worse; None without causes or for few tests.
         workspace: the calibration's error over the workspace; None without findings.
         second_start_agrees: None if interrupted.
         cancelling: cancelling effects [mm], or None.
@@ -215,7 +215,7 @@ class Diagnosis:
     before: Calibration
     after: Calibration
     held_out: tuple[HeldOut, HeldOut]
-    chosen_anew: ChosenAnew | None
+    held_out_worse: bool | None
     levels: Levels
     outliers: tuple[Outlier, ...]
     workspace: WorkspaceError | None

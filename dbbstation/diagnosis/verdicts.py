@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.explain import Explained, SettledCircles
-    from dbbstation.inference.folds import ChosenAnew, KnownGains
+    from dbbstation.inference.folds import KnownGains
     from dbbstation.inference.left_over import Remainder
     from dbbstation.inference.levels import Levels, Said
     from dbbstation.inference.model_comparison import Cause, Member
@@ -58,22 +58,24 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
 
 
-def judge(explained: Explained, outcome: Settled, anew: ChosenAnew | None, levels: Levels) -> tuple[SourceFinding, ...]:
+def judge(
+    explained: Explained, outcome: Settled, gains: KnownGains | None, levels: Levels
+) -> tuple[SourceFinding, ...]:
     """Return one finding per named cause, present ones first.
 
     Args:
-        anew: results of held-out tests; None if not tested.
+        gains: of held-out tests; None if not tested.
     """
-    return _CircleJudge(explained, outcome, anew, levels).findings()
+    return _CircleJudge(explained, outcome, gains, levels).findings()
 
 
 class _CircleJudge(CauseJudge):
     is_catalogue = True
 
-    def __init__(self, explained: Explained, outcome: Settled, anew: ChosenAnew | None, levels: Levels) -> None:
+    def __init__(self, explained: Explained, outcome: Settled, gains: KnownGains | None, levels: Levels) -> None:
         self._circles, self._joint = explained.channel, explained.settled
         self._named = {cause.name: cause for cause in outcome.causes if cause.named}
-        super().__init__(outcome, Trial(anew), levels)
+        super().__init__(outcome, Trial(gains), levels)
 
     def findings(self) -> tuple[SourceFinding, ...]:
         """Return all findings."""

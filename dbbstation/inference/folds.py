@@ -25,12 +25,11 @@ from dbbstation.inference.followed import (
     WithoutPart,
     classes_of,
     follow_of,
-    left_without,
 )
 from dbbstation.inference.hypotheses import search
 from dbbstation.inference.levels import DensityGains, Gains, is_worse
 from dbbstation.inference.square_root import Block, Columns, Solution, compress, solve, spread
-from dbbstation.inference.triangle import rms, squares
+from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -54,7 +53,36 @@ class HeldOut:
     normalised: float
 
 
-def held_out(
+def errors_without(
+    blocks: Sequence[Block],
+    tests: Sequence[str],
+    known: Columns,
+    widths: Mapping[str, int],
+    noise: float,
+    held: Floats,
+    single: float | None = None,
+) -> Callable[[Collection[str]], HeldOut]:
+    """Return a function that omits groups of tests in turn and predicts them without some causes.
+
+    Args:
+        tests: of each block.
+        known: of the columns of the base, then of causes.
+        widths: number of each cause's columns, which the kept blocks alone determine.
+        noise: white noise of equal low-frequency power.
+        held: directions of the base's fitted columns held at zero, in scaled columns.
+        single: noise of a single measurement, if smaller than `noise`; else None.
+    """
+    groups, base = in_turn(tests, BOUNDS.folds_of_an_error), len(known.prior) - sum(widths.values())
+    owner = np.repeat(["", *widths], [base, *widths.values()])
+
+    def without(names: Collection[str]) -> HeldOut:
+        active = np.flatnonzero(~np.isin(owner, list(names)))
+        return _held_out(blocks, groups, known, active, base, noise, held, single)
+
+    return without
+
+
+def _held_out(
     blocks: Sequence[Block],
     groups: Sequence[int],
     known: Columns,
@@ -62,18 +90,8 @@ def held_out(
     base: int,
     noise: float,
     held: Floats,
-    single: float | None = None,
+    single: float | None,
 ) -> HeldOut:
-    """Omit groups of blocks in turn and predict them.
-
-    Args:
-        groups: group of each block, such as the fold of its test.
-        active: columns that predict, all of the base first.
-        base: number of the base's columns. The kept blocks alone give the others, which are causes.
-        noise: white noise of equal low-frequency power.
-        held: directions of the base's fitted columns held at zero, in scaled columns.
-        single: noise of a single measurement, if smaller than `noise`; else None.
-    """
     used = Columns(known.prior[active], known.scale[active], known.random[active] & (active < base))
     held = np.hstack([held, np.zeros((len(held), len(active) - base))])
     thin = [_restricted(block, active) for block in blocks]
@@ -240,16 +258,15 @@ def held_out_error(
         plain = float(np.mean(residual[~rows])) if reference is None else reference(~rows)
         refitted = residual - channel.base.samples @ channel.without(rows).refitted()
         one, two, three = (rms(left[rows]) for left in (residual - plain, refitted, part.settled.left))
-        found.append(Fold(part.name, int(rows.sum()), one, two, three, _gains(part.settled, rows)))
+        found.append(Fold(part.name, int(rows.sum()), one, two, three, _gains(part)))
     return HeldOutError(tuple(found))
 
 
-def _gains(settled: Settled, rows: Flags) -> dict[Kind, float]:
-    with_all = squares(left_without(settled, ())[rows])
-    found: dict[Kind, float] = {}
-    for member in settled.best.members:
-        kind, error = settled.bank.kind_of(member.name), left_without(settled, [member.name])
-        found[kind] = found.get(kind, 0.0) + squares(error[rows]) - with_all
+def _gains(part: WithoutPart) -> dict[Kind, float]:
+    (_, with_all), found = part.predicted(), dict[Kind, float]()
+    for name in (member.name for member in part.settled.best.members):
+        kind = part.settled.bank.kind_of(name)
+        found[kind] = found.get(kind, 0.0) + part.predicted([name])[1] - with_all
     return found
 
 
@@ -341,56 +358,43 @@ def refits_without(settled: Settled, parts: Sequence[Flags]) -> tuple[Solution, 
         )
 
 
-Classes: TypeAlias = "tuple[Sequence[frozenset[str]], Callable[[str], frozenset[str]]]"
-"""Classes of variables, and a function from causes to followed variables."""
-
 LEAST_PARTS = 4
 """Fewest parts for a gain without the best part and for a scatter."""
 
-
-@dataclass(frozen=True, eq=False)
-class ChosenAnew:
-    """Log density gains in held-out parts.
-
-    Attributes:
-        brought: per part, the gain by each selected kind of effect.
-        whole: per part, the gain of all effects over the base.
-        of_classes: per part, the gain by each class of variables.
-    """
-
-    brought: tuple[dict[Kind, float], ...]
-    whole: tuple[float, ...]
-    of_classes: tuple[Mapping[frozenset[str], float], ...] = ()
-
-    def gains_of(self, kinds: Collection[Kind]) -> DensityGains:
-        """Return the summed gain of several kinds in each part; zero for unselected kinds."""
-        return DensityGains(tuple(sum(part.get(kind, 0.0) for kind in set(kinds)) for part in self.brought))
-
-    @property
-    def is_worse(self) -> bool:
-        """Return whether the selection predicts worse than the base."""
-        return sum(self.whole) < 0.0
+Gained: TypeAlias = "dict[Kind | frozenset[str], float]"
+"""Gains of log density in a part, by kind of effect or by variables of a class; the empty set is for all effects."""
 
 
 @dataclass(frozen=True, eq=False)
 class KnownGains:
-    """Held-out gains computed for a fixed list of classes.
+    """Held-out gains computed for each selected effect and a fixed list of classes.
 
     Attributes:
         rows: of each part, shape (n,).
-        gains: gain of each class by its variables; the empty set is for all effects.
-        errors: rms error of each part with all effects.
-        anew: gains by the selections without each part; None if unknown.
+        before: rms error of all parts without each class.
+        after: rms error of all parts with all effects.
     """
 
     rows: Sequence[Flags]
-    gains: Mapping[frozenset[str], ClassGain]
-    errors: Sequence[float]
-    anew: ChosenAnew | None = None
+    parts: Sequence[Gained]
+    before: Mapping[frozenset[str], float]
+    after: float
 
     def of(self, wanted: Collection[str] | None) -> ClassGain:
         """Return the gain of a class by its variables, None for all effects; zero if unknown."""
-        return self.gains.get(frozenset(wanted or ()), ClassGain(DensityGains(()), 0.0, 0.0))
+        key = frozenset(wanted or ())
+        if key not in self.before:
+            return ClassGain(DensityGains(()), 0.0, 0.0)
+        return ClassGain(self._gains({key}), self.before[key], self.after)
+
+    def gains_of(self, kinds: Collection[Kind]) -> DensityGains:
+        """Return the summed gain of several kinds in each part; zero for unselected kinds."""
+        return self._gains(set(kinds))
+
+    @property
+    def is_worse(self) -> bool:
+        """Return whether the selections predict worse than the base."""
+        return self.of(None).gains.total < 0.0
 
     def but_for(self, _ignored: Collection[str]) -> KnownGains:
         """Return unchanged gains, because events in tests are random effects here and simulator terms do not follow time."""
@@ -398,7 +402,11 @@ class KnownGains:
 
     def errors_with(self, _wanted: Collection[str]) -> list[float]:
         """Return the rms errors with all effects, because they are applied together."""
-        return list(self.errors)
+        return [self.after] * len(self.rows)
+
+    def _gains(self, keys: Collection[Kind | frozenset[str]]) -> DensityGains:
+        gains = tuple(sum(part.get(key, 0.0) for key in keys) for part in self.parts)
+        return DensityGains(gains, tuple(int(rows.sum()) for rows in self.rows))
 
 
 def groups_of_tests(tests: Sequence[str]) -> list[int]:
@@ -416,7 +424,7 @@ def rows_of_groups(groups: Sequence[int], blocks: Sequence[slice]) -> list[Flags
 def gains_of_tests(
     settled: Settled,
     rows: Sequence[Flags],
-    errors: Callable[[Sequence[Collection[str]]], Sequence[float]],
+    errors: Callable[[], Callable[[Collection[str]], HeldOut]],
     asked: Callable[[Cause], bool] = lambda _: True,
     **limits: Any,  # noqa: ANN401 - as of `search`
 ) -> KnownGains | None:
@@ -424,7 +432,7 @@ def gains_of_tests(
 
     Args:
         rows: of each group, shape (n,).
-        errors: function from sets of names to rms errors of predicting groups without each set's causes.
+        errors: function that returns `errors_without` for this outcome.
         limits: options of the searches without a group.
     """
     if not rows or not settled.best.members:
@@ -438,15 +446,10 @@ def gains_of_tests(
     comparisons = settled.comparison, (settled.bank.without(out, used) for out in rows)
     follow = follow_of(settled)
     classes = [one.wanted for one in classes_of(settled, VariableProbabilities(settled))]
-    anew = chosen_anew(*comparisons, choose, settled.bank.kind_of, asked, (classes, follow))
-    names = [member.name for member in settled.best.members]
-    without = [{name for name in names if follow(name) & wanted} for wanted in classes]
-    error, *others = errors([(), *without, names])
-    counts = tuple(int(one.sum()) for one in rows)
-    parts = [*(tuple(part[key] for part in anew.of_classes) for key in classes), anew.whole]
-    every = zip([*classes, frozenset[str]()], parts, others, strict=True)
-    gains = {key: ClassGain(DensityGains(part, counts), before, error) for key, part, before in every}
-    return KnownGains(rows, gains, [error] * len(rows), anew)
+    parts = chosen_anew(*comparisons, choose, settled.bank.kind_of, asked, classes, follow)
+    names, without = settled.best.names, errors()
+    before = {one: without([name for name in names if follow(name) & one]).rms for one in classes}
+    return KnownGains(rows, parts, {frozenset(): without(names).rms, **before}, without(()).rms)
 
 
 SHARE = 0.7
@@ -492,35 +495,32 @@ def chosen_anew(
     choose: Callable[[ModelComparison], Sequence[Member]],
     kind_of: Callable[[str], Kind],
     asked: Callable[[Cause], bool] = lambda _: True,
-    classes: Classes = ((), lambda _: frozenset()),
-) -> ChosenAnew:
-    """Select causes without each part, and predict this part.
+    classes: Sequence[frozenset[str]] = (),
+    follow: Callable[[str], frozenset[str]] = lambda _: frozenset(),
+) -> list[Gained]:
+    """Select causes without each part, and return their gains in this part.
 
     Args:
         choose: function from a comparison to its most probable members, starting from all rows' selection.
         kind_of: function from a cause to its kind.
-        classes: effects of a class are omitted together.
+        asked: function that selects causes whose own gain is wanted.
+        classes: variables of classes, whose effects are omitted together.
+        follow: function from a cause to followed variables.
     """
-    brought, whole, of_classes, follows = [], [], [], classes[1]
+    parts = []
     for others in of_others:
         chosen = choose(others)
-        names = [member.name for member in chosen if asked(member.cause)]
-        with_all = _predicted(of_all, others, chosen)
-        found: dict[Kind, float] = {}
-        for name in names:
-            but_for = _predicted(of_all, others, [m for m in chosen if m.name != name])
-            found[kind_of(name)] = found.get(kind_of(name), 0.0) + with_all - but_for
-        rest = {wanted: [m for m in chosen if not follows(m.name) & wanted] for wanted in classes[0]}
-        of_classes.append(
-            {
-                wanted: with_all - _predicted(of_all, others, less) if len(less) < len(chosen) else 0.0
-                for wanted, less in rest.items()
-            }
-        )
-        brought.append(found)
-        whole.append(with_all)
+        whole = _predicted(of_all, others, chosen)
+        found: Gained = {frozenset[str](): whole}
+        for name in (member.name for member in chosen if asked(member.cause)):
+            less = [m for m in chosen if m.name != name]
+            found[kind_of(name)] = found.get(kind_of(name), 0.0) + whole - _predicted(of_all, others, less)
+        for wanted in classes:
+            less = [m for m in chosen if not follow(m.name) & wanted]
+            found[wanted] = whole - _predicted(of_all, others, less)
+        parts.append(found)
         del others  # free the products before the next part needs as much memory
-    return ChosenAnew(tuple(brought), tuple(whole), tuple(of_classes))
+    return parts
 
 
 def _predicted(of_all: ModelComparison, of_others: ModelComparison, members: Sequence[Member]) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,13 +15,15 @@ from dbbstation.inference.levels import RUN, SURE, TIME, DensityGains
 from dbbstation.inference.looks import IN_TIME
 from dbbstation.inference.model_comparison import all_columns, belong_to
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.triangle import rms, squares
+from dbbstation.inference.triangle import squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.bank import Bank
+    from dbbstation.inference.folds import HeldOutError
+    from dbbstation.inference.levels import Gains
     from dbbstation.inference.model_comparison import Cause
     from dbbstation.inference.settle import Settled
 
@@ -45,6 +48,20 @@ class WithoutPart:
     rows: Flags
     settled: Settled
     name: str = ""
+    _known: dict[frozenset[str], tuple[float, float]] = field(default_factory=dict)
+
+    def predicted(self, without: Iterable[str] = ()) -> tuple[float, float]:
+        """Return log density and squared error of the part, with all members but some refitted to the other parts."""
+        key = frozenset(without)
+        if key not in self._known:
+            left = left_without(self.settled, key)
+            self._known[key] = log_density(self.settled, self.rows, left), squares(left[self.rows])
+        return self._known[key]
+
+    @cached_property
+    def follow(self) -> Callable[[str], frozenset[str]]:
+        """Return the function from causes to followed variables."""
+        return follow_of(self.settled)
 
 
 def followed_by(bank: Bank, name: str) -> frozenset[str]:
@@ -254,10 +271,12 @@ class ChosenWithoutParts:
     """Selections from a table, each with one part left out.
 
     Attributes:
+        held_out: errors of each kind of effect, which may refute laws; None if not computed.
         ignored: predictions omit effects that follow only these variables.
     """
 
     parts: Sequence[WithoutPart]
+    held_out: HeldOutError | None = None
     ignored: frozenset[str] = frozenset()
 
     @property
@@ -265,9 +284,25 @@ class ChosenWithoutParts:
         """Return the parts' rows, shape (n,) each."""
         return [part.rows for part in self.parts]
 
+    def gains_of(self, kinds: Collection[tuple[str, ...]]) -> Gains | None:
+        """Return the summed gain of several kinds in each part; None if not computed."""
+        return None if self.held_out is None else self.held_out.gains_of(kinds)
+
     def of(self, wanted: Collection[str] | None) -> ClassGain:
         """Return the gain of effects of these variables; None for all effects."""
-        return gain_of(self.parts, wanted, self.ignored)
+        brought, before, after = [], 0.0, 0.0
+        for part in self.parts:
+            names, follow = part.settled.best.names, part.follow
+            out = {name for name in names if follow(name) <= self.ignored}
+            own = {name for name in names if wanted is None or follow(name) & set(wanted)}
+            (density, error), (less, more) = part.predicted(out), part.predicted(out | own)
+            brought.append(density - less)
+            after += error
+            before += more
+        counts = tuple(int(rows.sum()) for rows in self.rows)
+        mean = float(sum(counts))
+        gains = DensityGains(tuple(brought), counts)
+        return ClassGain(gains, float(np.sqrt(before / mean)), float(np.sqrt(after / mean)))
 
     def but_for(self, ignored: Collection[str]) -> ChosenWithoutParts:
         """Return the selections with other ignored variables."""
@@ -277,42 +312,22 @@ class ChosenWithoutParts:
         """Return each part's rms error with only effects of these variables, or with all effects if none are given."""
         # Effects in time may be the drift that belongs to a law over a variable.
         also = {TIME, RUN} if wanted and self.of({TIME, RUN}).predicts else set[str]()
-        left = [left_with(part.settled, {*wanted, *also}, anew=True)[part.rows] for part in self.parts]
-        return [rms(rows) for rows in left]
+        found = ((part.predicted(besides(part.settled, {*wanted, *also}, anew=True)), part) for part in self.parts)
+        return [float(np.sqrt(error / part.rows.sum())) for (_, error), part in found]
 
 
-def left_with(one: Settled, wanted: Collection[str], *, anew: bool = False) -> Floats:
-    """Return the residual after refitting only effects of these variables, or all effects if none are given.
+def besides(one: Settled, wanted: Collection[str], *, anew: bool = False) -> set[str]:
+    """Return members that follow none of these variables; none if no variables are given.
 
     Args:
-        anew: whether an effect counts that a cause over these variables can replace. A selection without a part may give
+        anew: whether a cause over these variables that can replace a member suffices. A selection without a part may give
             play of an axis the name of its screw.
     """
     follow, own = follow_of(one), frozenset(wanted)
     rest = {name for name in one.best.names if own and not follow(name) & own}
     ways = {name: way_of(one.bank, name) for name in rest} if anew else {}
     same = {n for n, way in ways.items() if way in AT_ONCE and in_place_of(one, [n], way, own.issuperset)}
-    return left_without(one, rest - same)
-
-
-def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignored: Collection[str] = ()) -> ClassGain:
-    """Return the held-out gain of effects of these variables; None for all effects.
-
-    Both predictions omit effects that follow only ignored variables.
-    """
-    brought, before, after = [], 0.0, 0.0
-    for part in parts:
-        one, rows, follow = part.settled, part.rows, follow_of(part.settled)
-        out = [name for name in one.best.names if follow(name) <= set(ignored)]
-        names = [n for n in one.best.names if n not in out and (wanted is None or follow(n) & set(wanted))]
-        with_all = left_without(one, out)
-        without = left_without(one, [*out, *names]) if names else with_all
-        after += squares(with_all[rows])
-        before += squares(without[rows])
-        brought.append(log_density(one, rows, with_all) - log_density(one, rows, without) if names else 0.0)
-    counts = tuple(int(part.rows.sum()) for part in parts)
-    mean = float(sum(counts))
-    return ClassGain(DensityGains(tuple(brought), counts), float(np.sqrt(before / mean)), float(np.sqrt(after / mean)))
+    return rest - same
 
 
 def left_without(one: Settled, names: Collection[str], unseen: Collection[str] = ()) -> Floats:

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.inference.channel import Channel, Variable
-    from dbbstation.inference.folds import ChosenAnew, HeldOutError, KnownGains
+    from dbbstation.inference.folds import KnownGains
     from dbbstation.inference.followed import ChosenWithoutParts, ClassGain, VariableClass
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.model_comparison import Cause, Member, Variant
@@ -378,7 +378,6 @@ def levels_of(
     settled: Settled,
     left: LeftOver,
     parts: ChosenWithoutParts | KnownGains | None,
-    held_out: HeldOutError | ChosenAnew | None,
     matters: float | None = None,
     *,
     reference: float | None = None,
@@ -399,7 +398,7 @@ def levels_of(
     if parts is not None and not any(parts.of(wanted).predicts for wanted in ways):
         # Single events do not continue in other rows; a curve over time would interpolate them there.
         parts = parts.but_for({TIME, RUN})
-    found = [_followed(settled, one, probabilities, parts, held_out) for one in every]
+    found = [_followed(settled, one, probabilities, parts) for one in every]
     classes = tuple(sorted(found, key=lambda one: (one.consequence, one.may_result)))
     doubts = _doubts_about_noise(settled) if sizes is None else ()
     sizes = detectable(settled) if sizes is None else sizes
@@ -471,7 +470,6 @@ def _followed(
     one: VariableClass,
     probabilities: VariableProbabilities,
     parts: ChosenWithoutParts | KnownGains | None,
-    held_out: HeldOutError | ChosenAnew | None,
 ) -> Followed:
     probability = min(probabilities.of(each) for each in one.each)
     gain = None if parts is None else parts.of(one.wanted)
@@ -483,7 +481,7 @@ def _followed(
     form, (slope, straight) = None, _straight(settled, one)
     if answer in (FollowsAnswer.FOLLOWS, FollowsAnswer.NOT_TESTED):
         rows = None if parts is None else parts.rows
-        form = law_form(settled, one, rows, set() if held_out is None else _refuted(settled, held_out))
+        form = law_form(settled, one, rows, set() if parts is None else _refuted(settled, parts))
     return Followed(
         variables=one.each,
         or_variables=one.others,
@@ -505,11 +503,11 @@ def _followed(
     )
 
 
-def _refuted(settled: Settled, held_out: HeldOutError | ChosenAnew) -> set[str]:
+def _refuted(settled: Settled, parts: ChosenWithoutParts | KnownGains) -> set[str]:
     found, picked = set[str](), settled.bank.looked_for
     for name in (cause.name for cause in settled.causes):
-        gains = held_out.gains_of({settled.bank.kind_of(name)})
-        if not gains.predicts if name in picked else gains.without_best < 0.0:
+        gains = parts.gains_of({settled.bank.kind_of(name)})
+        if gains is not None and (not gains.predicts if name in picked else gains.without_best < 0.0):
             found.add(name)
     return found
 
@@ -546,8 +544,8 @@ def _answer(probability: float, gain: ClassGain | None, *, in_time: bool) -> Fol
 
 def levels_by_tests(settled: Settled, left: LeftOver, gains: KnownGains | None) -> Levels:
     """Return the three answers, with the strut, or all struts, on which each class surely acts."""
-    anew, reference = (None, None) if gains is None else (gains.anew, gains.of(None).before)
-    found = levels_of(settled, left, gains, anew, reference=reference, sizes=detectable_causes(settled))
+    reference = None if gains is None else gains.of(None).before
+    found = levels_of(settled, left, gains, reference=reference, sizes=detectable_causes(settled))
     follows = tuple(replace(one, where=_place(settled, one.members)) for one in found.follows)
     return replace(found, follows=follows)
 

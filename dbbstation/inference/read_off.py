@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.inference.channel import Law
-    from dbbstation.inference.folds import ChosenAnew, HeldOutError
+    from dbbstation.inference.folds import KnownGains
+    from dbbstation.inference.followed import ChosenWithoutParts
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.model_comparison import Cause, Member, Variant
     from dbbstation.inference.settle import Settled
@@ -227,7 +228,7 @@ class Trial:
         chosen: values by member of selections without one part each; may be empty.
     """
 
-    held_out: HeldOutError | ChosenAnew | None = None
+    held_out: ChosenWithoutParts | KnownGains | None = None
     refits: Sequence[Solution] = ()
     chosen: Sequence[Mapping[str, Mapping[str, Value]]] = ()
 

@@ -158,7 +158,7 @@ def comparison_result(
 ) -> ComparisonResult:
     """Return the result of a comparison; lengths in µm, largest runs first."""
     largest_first = sorted(found.runs, key=lambda run: (-run.differs, -sum_of(run.found_mm**2), -run.rms_um))
-    pairs, held_out = found.matching, found.trial.held_out
+    pairs, gains = found.matching, found.gains
     before, after = found.held_out
     return of_facts(
         ComparisonResult,
@@ -174,8 +174,8 @@ def comparison_result(
         beyond_chance_rms_um=1e3 * found.found_rms_mm,
         noise_rms_um=found.runs[0].noise_rms_um,
         strut_change_noticed_um=1e3 * found.noticed_mm,
-        held_out="not-tested" if held_out is None else "tested",
-        held_out_worse=None if held_out is None else held_out.is_worse,
+        held_out="not-tested" if gains is None else "tested",
+        held_out_worse=None if gains is None else gains.is_worse,
         held_out_rms_um=BeforeAfter(1e3 * before.rms, 1e3 * after.rms),
         runs=tuple(largest_first),
         organised_text=organised_text(found),

@@ -137,8 +137,7 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
         residual_rms_um=BeforeAfter(rms_um(diagnosis.before.residual_mm), rms_um(diagnosis.after.residual_mm)),
         held_out_rms_um=BeforeAfter(1e3 * before.rms, 1e3 * after.rms),
         held_out_normalised=BeforeAfter(before.normalised, after.normalised),
-        held_out="not-tested" if diagnosis.chosen_anew is None else "tested",
-        held_out_worse=None if diagnosis.chosen_anew is None else diagnosis.chosen_anew.is_worse,
+        held_out="not-tested" if diagnosis.held_out_worse is None else "tested",
         circularity_um=_circularity(diagnosis),
         sources=ByName(
             (

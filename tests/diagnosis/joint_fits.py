@@ -49,7 +49,7 @@ def joint_fit(machine, names, noise_mm=3e-4, *, unexplained=None):
         before=before,
         after=after,
         held_out=(HeldOut(5e-3, 3.0), HeldOut(4e-4, 1.0)),
-        chosen_anew=None,
+        held_out_worse=None,
         levels=Levels(
             DifferenceFound(
                 answer=Differs.YES if sources else Differs.NO,

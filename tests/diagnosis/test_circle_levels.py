@@ -70,13 +70,15 @@ def test_classes_are_left_out_together(both):
     others = channel.beside_base(noise, but_for=out).comparison(np.where(out, 0.0, target))
     best = outcome.best.members
     wanted = [one.wanted for one in classes]
-    found = chosen_anew(whole, [others], lambda _: best, lambda name: (name,), classes=(wanted, follow_of(outcome)))
+    (found,) = chosen_anew(
+        whole, [others], lambda _: best, lambda name: (name,), classes=wanted, follow=follow_of(outcome)
+    )
     for one in classes:
         less = [m for m in best if m.cause.name not in one.members]
         brought = (whole.log_evidence(best) - others.log_evidence(best)) - (
             whole.log_evidence(less) - others.log_evidence(less)
         )
-        assert found.of_classes[0][one.wanted] == pytest.approx(brought, abs=1e-6)
+        assert found[one.wanted] == pytest.approx(brought, abs=1e-6)
 
 
 @pytest.mark.slow
@@ -141,7 +143,7 @@ def test_the_probability_of_a_strut_is_that_of_its_forms(both):
 @pytest.mark.slow
 def test_verdicts_are_read_off_the_levels(both):
     explained, outcome, gains, levels = both
-    found = {one.name: one for one in judge(explained, outcome, gains.anew, levels)}
+    found = {one.name: one for one in judge(explained, outcome, gains, levels)}
     assert found["backlash"].verdict is Verdict.IDENTIFIED
     assert found["gravity"].verdict is Verdict.IDENTIFIED
     assert all(found[name].verdict.rank > Verdict.AMBIGUOUS.rank for name in FEW if name not in {"gravity", "backlash"})

@@ -15,4 +15,4 @@ if TYPE_CHECKING:
 
 def read_by_levels(settled: Settled, trial: Trial | None = None) -> tuple[CauseFinding, ...]:
     """Every finding, read off the levels of all rows."""
-    return read_off(settled, trial or Trial(), levels_of(settled, left_over(settled), None, None))
+    return read_off(settled, trial or Trial(), levels_of(settled, left_over(settled), None))

@@ -94,7 +94,7 @@ def test_a_table_that_lacks_one_names_it_with_its_numbers(name):
     settled = settle(
         replace(channel(data, blocks=1), laws=tuple(laws_of(data).values())), beginnings=ONE, thorough=False
     )
-    levels = levels_of(settled, left_over(settled), None, None)
+    levels = levels_of(settled, left_over(settled), None)
     named = {law for one in levels.follows for law in (one.form.names if one.form else ())}
     assert name in named
     member = next(m for m in settled.best.members if m.cause.name == name)

@@ -72,9 +72,9 @@ def test_gain_is_the_log_density_of_the_part_with_the_effect_less_that_without(r
         both, first, second, neither = (
             density(base, columns[:, list(some)], target, out) for some in ((0, 1), (0,), (1,), ())
         )
-        assert found.brought[k]["there",] == pytest.approx(both - second, abs=1e-3)
-        assert found.brought[k]["in one part",] == pytest.approx(both - first, abs=1e-3)
-        assert found.whole[k] == pytest.approx(both - neither, abs=1e-3)
+        assert found[k]["there",] == pytest.approx(both - second, abs=1e-3)
+        assert found[k]["in one part",] == pytest.approx(both - first, abs=1e-3)
+        assert found[k][frozenset()] == pytest.approx(both - neither, abs=1e-3)
 
 
 def test_what_is_in_one_part_alone_does_not_predict(rows):
@@ -82,9 +82,10 @@ def test_what_is_in_one_part_alone_does_not_predict(rows):
     of_all, of_others = comparisons(base, columns, target, part)
     best = search(of_all, CAUSES).best
     assert best.names == {"there", "in one part"}
-    found = chosen_anew(
+    parts = chosen_anew(
         of_all, of_others, lambda c: search(c, CAUSES, [best.members]).best.members, lambda name: (name,)
     )
+    found = KnownGains([part == k for k in range(PARTS)], parts, {frozenset(): 1.0}, 1.0)
     assert found.gains_of([("there",)]).predicts
     assert not found.is_worse
     once = found.gains_of([("in one part",)])
@@ -109,6 +110,6 @@ def test_what_brings_nothing_seldom_predicts(rng):
 
 
 def test_a_class_that_nothing_follows_predicts_nothing():
-    gains = KnownGains([], {}, [])
+    gains = KnownGains([], [], {}, 0.0)
     assert not gains.of({"time", "run"}).predicts
     assert gains.of({"time", "run"}).gains.total == 0.0

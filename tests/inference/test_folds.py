@@ -152,7 +152,7 @@ def test_what_came_once_has_happened_and_a_step_that_gains_persists(last, persis
     whole = channel(data, blocks=1)
     settled = settle(replace(whole, residual=whole.residual + 0.3 * inside))
     (name,) = [name for name in settled.best.names if "rows" in name]
-    levels = levels_of(settled, left_over(settled), None, None)
+    levels = levels_of(settled, left_over(settled), None)
     every = {one.name: one for one in read_off(settled, trial([settled.bank.kind_of(name)], 0.5), levels)}
     assert not any(one.verdict is Verdict.IDENTIFIED for one in every.values())
     told = every[name]
@@ -169,7 +169,7 @@ def test_what_came_once_beside_what_does_not_predict_is_not_sure():
     inside = (np.arange(600) >= 200) & (np.arange(600) < 280)
     settled = settle(replace(whole, residual=whole.residual + 0.4 * inside))
     (pulse,) = settled.best.names - {"hysteresis of q"}
-    found = levels_of(settled, left_over(settled), None, None)
+    found = levels_of(settled, left_over(settled), None)
 
     def told(answer, *, correction):
         classes = [replace(one, answer=answer) if "hysteresis of q" in one.members else one for one in found.follows]

@@ -20,7 +20,6 @@ from dbbstation.inference.followed import (
     WithoutPart,
     classes_of,
     followed_by,
-    gain_of,
     log_density,
     probability_of_any,
 )
@@ -80,7 +79,7 @@ def nothing():
 
 def test_both_variables_are_followed_each_with_its_law(both):
     _, settled, parts = both
-    found = levels_of(settled, left_over(settled), ChosenWithoutParts(parts), None)
+    found = levels_of(settled, left_over(settled), ChosenWithoutParts(parts))
     assert found.differs.answer is Differs.YES
     assert found.differs.gain_without_best > np.log(19.0)
     by_name = {one.name: one for one in found.follows}
@@ -96,16 +95,16 @@ def test_what_a_class_brings_is_what_a_refit_without_it_loses(both):
     data, settled, parts = both
     q = [direction(data.q)]
     angle = [np.cos(2.0 * np.radians(data.angle)), np.sin(2.0 * np.radians(data.angle))]
-    gain = gain_of(parts, {"q"})
+    gain = ChosenWithoutParts(parts).of({"q"})
     for part, brought in zip(parts, gain.gains.parts, strict=True):
         sigma = part.settled.noise.innovation
         with_it, without = (squares(data.residual, columns, part.rows) for columns in ([*q, *angle], angle))
         assert brought == pytest.approx(0.5 * (without - with_it) / sigma**2, rel=0.1)
     assert gain.predicts
     assert gain.after < gain.before
-    every = gain_of(parts, None).gains.total
+    every = ChosenWithoutParts(parts).of(None).gains.total
     assert every > gain.gains.total > 0.0
-    assert gain_of(parts, {"load"}).gains.total == 0.0
+    assert ChosenWithoutParts(parts).of({"load"}).gains.total == 0.0
     assert settled.best.names == {"hysteresis of q", "twice per turn of angle"}
 
 
@@ -142,13 +141,13 @@ def test_probabilities_are_sums_over_sets(both):
 
 
 def test_no_effect_is_no_with_the_size_from_which_it_holds(nothing):
-    found = levels_of(nothing, left_over(nothing), None, None)
+    found = levels_of(nothing, left_over(nothing), None)
     assert found.differs.answer is Differs.NO
     assert found.differs.matters == pytest.approx(nothing.channel.size)
     assert not found.follows
     worst = found.differs.detectable[0]
     assert 0.0 < worst.size < found.differs.matters
-    strict = levels_of(nothing, left_over(nothing), None, None, matters=0.1 * worst.size)
+    strict = levels_of(nothing, left_over(nothing), None, matters=0.1 * worst.size)
     assert strict.differs.answer is Differs.CANNOT_TELL
     assert worst.follows in strict.differs.why
     assert strict.differs.matters_stated
@@ -156,7 +155,7 @@ def test_no_effect_is_no_with_the_size_from_which_it_holds(nothing):
 
 def test_rows_without_an_order_have_no_no(nothing):
     unordered = replace(nothing, channel=replace(nothing.channel, time=None))
-    answer = levels_of(unordered, left_over(unordered), None, None).differs
+    answer = levels_of(unordered, left_over(unordered), None).differs
     assert answer.answer is Differs.CANNOT_TELL
     assert "order" in answer.why
 
@@ -175,7 +174,7 @@ def test_what_the_base_conceals_wholly_has_no_size(nothing):
     concealed = settle(replace(nothing.channel, base=wide, static=None), thorough=False, beginnings=ONE)
     sizes = {one.follows: one for one in detectable(concealed)}
     assert sizes["load"] == Detectable("load", None, 1.0)
-    assert levels_of(concealed, left_over(concealed), None, None).differs.answer is Differs.CANNOT_TELL
+    assert levels_of(concealed, left_over(concealed), None).differs.answer is Differs.CANNOT_TELL
 
 
 def test_the_least_size_is_found_in_nine_of_ten_draws(rng):
@@ -271,7 +270,7 @@ def test_no_law_is_named_against_held_out_rows(both, parts, named):
         Fold("part", 60, 1.0, 1.0, 0.5, {("hysteresis of q",): gain, ("twice per turn of angle",): 1.0})
         for gain in parts
     )
-    found = levels_of(settled, left_over(settled), ChosenWithoutParts(without[:3]), HeldOutError(tuple(folds)))
+    found = levels_of(settled, left_over(settled), ChosenWithoutParts(without[:3], HeldOutError(tuple(folds))))
     forms = {one.name: one.form.name for one in found.follows}
     assert forms == {"q": "hysteresis of q" if named else None, "angle": "twice per turn of angle"}
 
@@ -281,7 +280,7 @@ def test_time_and_single_rows_are_the_time():
     inside = (np.arange(600) >= 200) & (np.arange(600) < 300)
     whole = channel(data, blocks=1)
     settled = settle(replace(whole, residual=whole.residual + 0.4 * inside))
-    (one,) = levels_of(settled, left_over(settled), None, None).follows
+    (one,) = levels_of(settled, left_over(settled), None).follows
     assert one.name == TIME
     assert one.answer is FollowsAnswer.HAPPENED
 
@@ -297,13 +296,13 @@ def test_a_sum_has_each_of_its_laws_named_beside_the_others():
     assert form.name is None
     assert set(form.together) == {"hysteresis of q", "curve over q"}
     assert set(law_form(settled, one, None).names) == set(form.together)
-    levels = levels_of(settled, left_over(settled), None, None)
+    levels = levels_of(settled, left_over(settled), None)
     assert {f.name for f in read_off(settled, Trial(), levels) if f.verdict is Verdict.IDENTIFIED} == set(form.together)
 
 
 def test_the_straight_line_through_an_effect_is_that_of_least_squares(both):
     data, settled, _ = both
-    follows = {one.name: one for one in levels_of(settled, left_over(settled), None, None).follows}
+    follows = {one.name: one for one in levels_of(settled, left_over(settled), None).follows}
     effect = settled.effect(["hysteresis of q"])
     slope, _ = np.polyfit(data.q, effect, 1)
     assert follows["q"].slope.value == pytest.approx(slope, rel=1e-6)
@@ -324,7 +323,7 @@ def test_the_straight_line_through_an_effect_is_that_of_least_squares(both):
 )
 def test_a_verdict_is_read_off_the_level_of_the_class(both, answer, form, verdict):
     _, settled, _ = both
-    levels = levels_of(settled, left_over(settled), None, None)
+    levels = levels_of(settled, left_over(settled), None)
     law = (
         None
         if answer is FollowsAnswer.UNDECIDED
@@ -339,7 +338,7 @@ def test_a_verdict_is_read_off_the_level_of_the_class(both, answer, form, verdic
 
 def said_of_hysteresis(settled, form, answer, probability):
     follows = Followed((("q",),), (), answer, 1.0, {}, 1.0, ("curve over q", "hysteresis of q"), form=form)
-    levels = replace(levels_of(settled, left_over(settled), None, None), follows=(follows,))
+    levels = replace(levels_of(settled, left_over(settled), None), follows=(follows,))
     return VerdictsByLevel(settled, levels, {}).of_member("hysteresis of q", probability, 9.0, Acts.ALWAYS)
 
 
@@ -358,7 +357,7 @@ def test_what_is_named_beside_it_is_no_rival_of_a_member_of_a_sum(both):
 
 def test_what_leaves_more_than_as_simulated_is_not_identified(both):
     _, settled, _ = both
-    levels = levels_of(settled, left_over(settled), None, None, worse=True)
+    levels = levels_of(settled, left_over(settled), None, worse=True)
     assert levels.correction is False
     found = read_off(settled, Trial(), levels)
     assert {one.verdict for one in found if one.name in settled.best.names} == {Verdict.DOES_NOT_PREDICT}
@@ -373,7 +372,7 @@ def test_a_search_ends_at_its_limit_with_the_best_so_far(both):
     assert short.best.members
     silent = settle(replace(whole, residual=table(3, rows=600).residual), most_work=1.0)
     assert silent.stopped
-    assert levels_of(silent, left_over(silent), None, None).differs.why == "the search ended at its limit of work"
+    assert levels_of(silent, left_over(silent), None).differs.why == "the search ended at its limit of work"
 
 
 def test_a_spent_search_that_meets_an_earlier_outcome_is_judged_in_its_columns(rng, monkeypatch):
@@ -436,7 +435,7 @@ def test_a_torque_carries_the_difference_and_a_temperature_does_not(rng):
 def test_a_correction_is_made_of_what_follows(both):
     """A play that follows beside a step in time: refits by least squares with the play alone."""
     data, settled, parts = both
-    levels = levels_of(settled, left_over(settled), None, None)
+    levels = levels_of(settled, left_over(settled), None)
     happened = [replace(one, answer=FollowsAnswer.HAPPENED) if one.name == "angle" else one for one in levels.follows]
     assert levels.corrects == {"q", "angle"}
     assert replace(levels, follows=tuple(happened)).corrects == {"q"}

@@ -20,11 +20,9 @@ from dbbstation.errors import TraceError
 from dbbstation.inference.alternatives import cancelling
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.folds import (
-    KnownGains,
+    errors_without,
     gains_of_tests,
     groups_of_tests,
-    held_out,
-    in_turn,
     refits_without,
     rows_of_groups,
 )
@@ -46,10 +44,9 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.compare.pairs import Matching, Pair
     from dbbstation.inference.alternatives import Cancelling
-    from dbbstation.inference.folds import HeldOut
+    from dbbstation.inference.folds import HeldOut, KnownGains
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Levels
-    from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.settle import Settled
     from dbbstation.machine.geometry import Machine
@@ -69,7 +66,7 @@ class Comparison:
     """Results of a comparison.
 
     Attributes:
-        trial: evidence of groups of tests; without predictions if nothing was found or there are few groups.
+        gains: of groups of tests; None if nothing was found or there are few groups.
         held_out: prediction errors with the stated set-up alone, and with findings [mm].
         effects: of the best set, by name, largest first.
         noticed_mm: detectable change of any strut's length.
@@ -80,7 +77,7 @@ class Comparison:
     findings: tuple[CauseFinding, ...]
     runs: tuple[RunDifference, ...]
     left: LeftOver
-    trial: Trial
+    gains: KnownGains | None
     held_out: tuple[HeldOut, HeldOut]
     effects: Mapping[str, EffectOfCause]
     noticed_mm: float
@@ -162,19 +159,23 @@ def compare(
     sides = Sides.of(machine, matching.pairs)
     settled = settle(channel_of(sides, sources), in_time=False, rivals=False, progress=progress)
     progress("held-out tests")
-    trial, gains = tried_without_tests(sides, settled, hold_out=hold_out)
+    without, names = errors_of(sides, settled), settled.best.names
+    parts = rows_of_groups(groups_of_tests([pair.test for pair in sides.pairs]), sides.blocks)
+    limit = BOUNDS.expanded_of_table
+    gains = gains_of_tests(settled, parts, lambda: without, most_expanded=limit) if hold_out else None
+    refits = refits_without(settled, parts) if names else ()
     left = left_over(settled)
     levels = levels_by_tests(settled, left, gains)
     levels = replace(levels, follows=with_set_up(levels.follows, sides, settled))
     return Comparison(
         matching=matching,
         settled=settled,
-        findings=read_off(settled, trial, levels),
+        findings=read_off(settled, Trial(gains, refits), levels),
         levels=levels.times(1e3),
-        trial=trial,
+        gains=gains,
         runs=_runs(sides, settled),
         left=left,
-        held_out=(predicted(sides, settled, ()), predicted(sides, settled, settled.best.members)),
+        held_out=(without(names), without(())),
         effects=effects_of(sides, settled),
         noticed_mm=noticed_mm(settled),
         lacking=lacking or {},
@@ -334,26 +335,14 @@ def noticed_mm(settled: Settled) -> float:
     return OUT / float(np.sqrt(max(min(products), 1e-300)))
 
 
-def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True) -> tuple[Trial, KnownGains | None]:
-    """Predict groups of tests; empty without findings or with fewer than `LEAST_PARTS` groups."""
-
-    def errors(without: Sequence[Collection[str]]) -> Sequence[float]:
-        return [predicted(sides, settled, settled.best.without(*names)).rms for names in without]
-
-    parts = rows_of_groups(groups_of_tests([pair.test for pair in sides.pairs]), sides.blocks)
-    refits = refits_without(settled, parts) if settled.best.members else ()
-    gains = gains_of_tests(settled, parts, errors, most_expanded=BOUNDS.expanded_of_table) if hold_out else None
-    return Trial(None if gains is None else gains.anew, refits), gains
-
-
-def predicted(sides: Sides, settled: Settled, members: Sequence[Member]) -> HeldOut:
-    """Return prediction errors of held-out tests with stated set-ups and some causes."""
-    bank, channel = settled.bank, settled.channel
+def errors_of(sides: Sides, settled: Settled) -> Callable[[Collection[str]], HeldOut]:
+    """Return a function that predicts held-out tests with stated set-ups, and with all found causes but some."""
+    bank, channel, members = settled.bank, settled.channel, settled.best.members
     columns, known = bank.jointly(members)
-    groups = in_turn([pair.test for pair in sides.pairs], BOUNDS.folds_of_an_error)
-    every = np.arange(len(known.prior))
-    blocks = [compress(every, columns[rows], bank.target[rows]) for rows in sides.blocks]
-    return held_out(blocks, groups, known, every, len(channel.base.prior), settled.noise.innovation, channel.held)
+    every, target = np.arange(len(known.prior)), bank.target
+    blocks = [compress(every, columns[rows], target[rows]) for rows in sides.blocks]
+    tests, widths = [pair.test for pair in sides.pairs], {member.name: len(member.columns) for member in members}
+    return errors_without(blocks, tests, known, widths, settled.noise.innovation, channel.held)
 
 
 SAME_TEMPERATURE_K = 0.5

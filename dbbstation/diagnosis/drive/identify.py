@@ -84,7 +84,7 @@ def identify(
     held, parts = held_out(explained.drive, progress) if hold_out else (None, None)
     settled, left = explained.settled, left_over(explained.settled)
     reference = None if held is None else held.reference
-    levels = levels_of(settled, left, parts, None, reference=reference, sizes=detectable_causes(settled))
+    levels = levels_of(settled, left, parts, reference=reference, sizes=detectable_causes(settled))
     verdicts = Verdicts(explained, levels, several_speeds=limits.several_speeds, held=held)
     values, scale = base_values(explained.drive, explained.settled, after), put_together.scale
     known = {

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.simulator.fit import not_told_apart
-from dbbstation.diagnosis.simulator.held import PredictedPart, PredictedPartsError, gains_of, parts, predicted_parts
+from dbbstation.diagnosis.simulator.held import PredictedPart, gains_of, parts, predicted_parts
 from dbbstation.diagnosis.simulator.nodes import Nodes, noise_of
 from dbbstation.diagnosis.simulator.search import compared, moves, search
 from dbbstation.diagnosis.simulator.separate import separations
 from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, FittedState, SimulationRuns
 from dbbstation.facts.value import Value, finite
-from dbbstation.inference.folds import LEAST_PARTS, refits_without
+from dbbstation.inference.folds import LEAST_PARTS, HeldOutError, refits_without
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels import Verdict
 from dbbstation.inference.levels_of import levels_of
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.separate import SeparatingInput
     from dbbstation.diagnosis.simulator.terms import Term
     from dbbstation.diagnosis.simulator.work import Run
-    from dbbstation.inference.folds import HeldOutError, KnownGains
+    from dbbstation.inference.folds import KnownGains
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.read_off import CauseFinding
@@ -145,7 +145,7 @@ def find(
             folds.extend(predicted_parts(nodes, base, found, stated, progress))
         except BudgetSpentError as error:
             stopped = error.what
-    held_out = PredictedPartsError(tuple(folds)) if len(folds) >= LEAST_PARTS else None
+    held_out = HeldOutError(tuple(folds)) if len(folds) >= LEAST_PARTS else None
     gains = None if held_out is None else gains_of(folds)
     return _said(nodes, base, found, held_out, as_simulated, stopped, gains=gains, matters=matters)
 
@@ -186,8 +186,8 @@ def _said(
         not_asked = {}
     open_to = {name: one for one in found.withstood if one.log_odds > 0.0 for name in one.names}
     reference = None if held_out is None else held_out.as_simulated
-    levels = levels_of(settled, left, gains, held_out, matters, reference=reference)
-    read = read_off(settled, Trial(held_out, refits), levels)
+    levels = levels_of(settled, left, gains, matters, reference=reference)
+    read = read_off(settled, Trial(gains, refits), levels)
     findings = tuple(_judged(one, found, nonlinear, open_to) for one in read)
     findings = tuple(sorted(findings, key=lambda one: (one.verdict.rank, -one.log_bayes_factor)))
     return SimulatorComparison(

@@ -14,20 +14,18 @@ from dbbstation.diagnosis.simulator.noise_left import noise_left
 from dbbstation.diagnosis.simulator.search import compared_quickly, search
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.coloured import log_student
-from dbbstation.inference.folds import Fold, HeldOutError, KnownGains, beside, part_numbers
-from dbbstation.inference.followed import ClassGain, VariableProbabilities, classes_of, followed_by
-from dbbstation.inference.levels import DensityGains
+from dbbstation.inference.folds import Fold, KnownGains, beside, part_numbers
+from dbbstation.inference.followed import VariableProbabilities, classes_of, followed_by
 from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.diagnosis.simulator.nodes import Node, Nodes
     from dbbstation.diagnosis.simulator.search import SearchOutcome
     from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
     from dbbstation.inference.channel import Channel
-    from dbbstation.inference.folds import Kind
     from dbbstation.inference.settle import Settled
 
 
@@ -45,30 +43,16 @@ class PredictedPart(Fold):
     of_classes: Mapping[frozenset[str], tuple[float, float]] = field(default_factory=dict)
 
 
-class PredictedPartsError(HeldOutError):
-    """Held-out parts with log density gains of terms."""
-
-    def gains_of(self, kinds: Collection[Kind]) -> DensityGains:
-        """Return the summed gain of terms in each part."""
-        gains = super().gains_of(kinds)
-        return DensityGains(gains.parts, gains.rows)
-
-
 def gains_of(parts: Sequence[PredictedPart]) -> KnownGains:
-    """Return the held-out gains of classes."""
+    """Return the held-out gains of terms and classes."""
     counts = np.array([part.rows for part in parts], dtype=np.float64)
 
     def over_all(errors: Sequence[float]) -> float:
         return float(np.sqrt(counts @ np.square(errors) / counts.sum()))
 
-    after = [part.after for part in parts]
-    found = {}
-    for key in parts[0].of_classes:
-        gains, before = zip(*(part.of_classes[key] for part in parts), strict=True)
-        found[key] = ClassGain(
-            DensityGains(gains, tuple(part.rows for part in parts)), over_all(before), over_all(after)
-        )
-    return KnownGains([part.where for part in parts], found, after)
+    gains = [{**part.gains, **{key: gain for key, (gain, _) in part.of_classes.items()}} for part in parts]
+    before = {key: over_all([part.of_classes[key][1] for part in parts]) for key in parts[0].of_classes}
+    return KnownGains([part.where for part in parts], gains, before, over_all([part.after for part in parts]))
 
 
 def parts(work: SimulationRuns) -> list[tuple[str, Flags]]:

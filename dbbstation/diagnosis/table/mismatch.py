@@ -17,7 +17,7 @@ from dbbstation.inference.alternatives import cancelling_of
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.coloured import widening_of
 from dbbstation.inference.folds import held_out_error, parts_of, refits_without, selections_without, weighted_jackknife
-from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_with
+from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, besides, left_without
 from dbbstation.inference.harmonics import noise_of
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels import OUT, Verdict, is_worse
@@ -145,7 +145,7 @@ class Mismatch:
     @property
     def correction(self) -> Floats:
         """Return the sum of base parameters and effects over variables, all rows, shape (n,)."""
-        return self.settled.channel.residual - left_with(self.settled, self.levels.corrects)
+        return self.settled.channel.residual - left_without(self.settled, besides(self.settled, self.levels.corrects))
 
     @property
     def rms_before(self) -> float:
@@ -194,13 +194,13 @@ def find_mismatch(
         refits = refits_without(settled, [rows for _, rows in parts_of(channel)])
         is_worse_here = is_worse(rms(settled.left), rms(residual - as_simulated(channel.kept)))
         left = left_over(settled)
-        parts = ChosenWithoutParts(chosen) if hold_out else None
+        parts = ChosenWithoutParts(chosen, held_out) if hold_out else None
         reference = None if held_out is None else held_out.as_simulated
-        levels = levels_of(settled, left, parts, held_out, matters, reference=reference, worse=is_worse_here)
+        levels = levels_of(settled, left, parts, matters, reference=reference, worse=is_worse_here)
         if held_out is not None and parts is not None and settled.best.members:
             held_out = held_out.corrected(parts.errors_with(levels.corrects))
         values = [values_of_members(one.settled, one.settled.best.members) for one in chosen]
-        findings = read_off(settled, Trial(held_out, refits, values), levels)
+        findings = read_off(settled, Trial(parts, refits, values), levels)
         return Mismatch(
             table=table,
             settled=settled,

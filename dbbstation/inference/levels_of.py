@@ -305,12 +305,12 @@ def least_seen(products: Floats, samples: Floats, plausible: Floats, log_odds: f
     along = (directions / size[:, None] / plausible) @ axes
     noise = rng.standard_normal(along.shape)
     down = 1.0 + np.square(SCALES)[:, None] * information
+    weights, constant = 0.5 * np.square(SCALES)[:, None] / down, LOG_SCALE_WEIGHTS - 0.5 * np.log(down).sum(axis=1)
 
     def power(level: float) -> float:
         towards = information * along * level + np.sqrt(information) * noise
-        factors = 0.5 * (np.square(towards)[:, None, :] * np.square(SCALES)[:, None] / down - np.log(down)).sum(axis=2)
-        sure = logsumexp(factors + LOG_SCALE_WEIGHTS, axis=1) + log_odds >= SURELY
-        return float(np.mean(sure))
+        factors = np.square(towards) @ weights.T + constant
+        return float(np.mean(np.logaddexp.reduce(factors, axis=1) + log_odds >= SURELY))
 
     low, high = 0.0, float(np.median(1.0 / np.maximum(np.sqrt(np.square(along) @ information), 1e-300)))
     for _ in range(MOST_DOUBLED):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.checks.scatter import SIGNIFICANT, fine_noise_mm, is_missing_physics, remainder_of
+from dbbstation.calibration.checks.scatter import SIGNIFICANT, fine_noise_mm, is_missing_physics
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.calibration.outliers.stray_balls import beside
 from dbbstation.computing.threads import with_one_thread
@@ -48,7 +48,6 @@ if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.explain import Explained, SettledCircles
     from dbbstation.inference.folds import KnownGains
-    from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settle import Settled
     from dbbstation.inference.square_root import Solution
@@ -105,7 +104,7 @@ def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out
     rivals = [f.name for f in sorted(findings, key=lambda f: -(f.gain or 0.0))[: BOUNDS.found_again]]
     again = {} if stopped else found_again(explained, outcome, rivals)
     findings = tuple(replace(f, stability=again.get(f.name)) for f in findings)
-    rest = _unexplained(explained, settled.left)
+    rest = _unexplained(explained)
     mismatch = is_missing_physics(explained.first) or bool(members) or bool(outliers) or rest.variable is not None
     held_out = predicted(explained)
     elsewhere = workspace_error(before, after) if members else None
@@ -159,14 +158,13 @@ def doubtful(explained: Explained) -> set[str]:
     return found
 
 
-def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
-    settled = explained.settled
+def _unexplained(explained: Explained) -> Unexplained:
+    settled, left = explained.settled, explained.settled.left
     posterior, unmodelled = settled.posterior, settled.unmodelled
     effects = [m for m in settled.best.members if unmodelled.of(m)]
     sure = posterior.probability(unmodelled.follows) >= SURE
     if not effects or not sure:
-        found = remainder_of(settled.after, settled.noise)
-        if not is_missing_physics(left) and found.probability >= SIGNIFICANT:
+        if not is_missing_physics(left) and settled.remainder.probability >= SIGNIFICANT:
             return _quick(settled)
         rough = rough_formulas(settled)
         text = "Something is left beyond noise, and no variable organises it clearly."
@@ -174,7 +172,7 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
             text = (
                 f"What is left is what the formula of {', '.join(rough)} may be off by: the machine follows it roughly."
             )
-        rms_um, where = where_left(settled.after.observations, found)
+        rms_um, where = where_left(settled)
         return Unexplained(max(1e3 * left.rms, rms_um), None, None, 0.0, f"{text} {where}")
     member = max(effects, key=lambda m: settled.best.log_factor(m.name))
     curve = curve_of(explained.channel, settled, member)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import chdtri
 
-from dbbstation.calibration.checks.scatter import misfit_of, seats_of
+from dbbstation.calibration.checks.scatter import misfit_of, remainder_of, seats_of
 from dbbstation.calibration.fit.calibrate import Calibration, calibrate, default_sources
 from dbbstation.calibration.outliers.robust import MOST, calibrate_robust, in_place_after_all
 from dbbstation.calibration.outliers.stray_balls import set_free
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.inference.harmonics import Misfit, Spectrum
     from dbbstation.inference.hypotheses import Posterior
+    from dbbstation.inference.left_over import Remainder
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
     from dbbstation.inference.projection import BesideBase
     from dbbstation.machine.geometry import Machine
@@ -64,6 +65,11 @@ class SettledCircles(Outcome):
     def members(self) -> tuple[Member, ...]:
         """Return the best hypothesis's named causes."""
         return tuple(m for m in self.best.members if m.cause.named)
+
+    @cached_property
+    def remainder(self) -> Remainder:
+        """Return the most significant features that the joint fit leaves."""
+        return remainder_of(self.after, self.noise)
 
     @property
     def noise_mm(self) -> float:

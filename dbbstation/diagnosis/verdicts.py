@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.checks.scatter import is_missing_physics, remainder_of
+from dbbstation.calibration.checks.scatter import is_missing_physics
 from dbbstation.calibration.outliers.outlier import OutlierKind
 from dbbstation.diagnosis.findings import Shift, SourceFinding
 from dbbstation.diagnosis.parts import SESSION_TIME, amplitudes, variable_of
@@ -43,7 +43,7 @@ from dbbstation.inference.triangle import root
 from dbbstation.sources.contract import Owner
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Outlier
@@ -51,11 +51,9 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.explain import Explained, SettledCircles
     from dbbstation.inference.folds import KnownGains
-    from dbbstation.inference.left_over import Remainder
     from dbbstation.inference.levels import Levels, Said
     from dbbstation.inference.model_comparison import Cause, Member
     from dbbstation.inference.projection import BesideBase
-    from dbbstation.model.observation import Observation
 
 
 def judge(
@@ -311,15 +309,15 @@ def _left(explained: Explained) -> LeftOver:
     settled = explained.settled
     if any(settled.unmodelled.of(member) for member in settled.best.members):
         return LeftOver(True, 1.0, ())  # noqa: FBT003 - its first field
-    found = remainder_of(settled.after, settled.noise)
-    rms_um, where = where_left(settled.after.observations, found)
+    found, (rms_um, where) = settled.remainder, where_left(settled)
     is_noise = not is_missing_physics(settled.left) and found.probability >= SIGNIFICANT
     test = ResidualTest("these tests", found.probability, rms_um / 1e3, where)
     return LeftOver(is_noise, found.probability, (test,))
 
 
-def where_left(observations: Sequence[Observation], found: Remainder) -> tuple[float, str]:
-    """Return a sentence on size [µm] and place of the largest residual."""
+def where_left(settled: SettledCircles) -> tuple[float, str]:
+    """Return size [µm] and place, as a sentence, of the largest residual."""
+    observations, found = settled.after.observations, settled.remainder
     worst = min((found.harmonic, found.run, found.pulse), key=lambda one: one.probability)
     size_um = 1e3 * worst.rms
     if worst is found.harmonic:
@@ -338,7 +336,7 @@ def limits_of(settled: SettledCircles) -> tuple[LimitReached, ...]:
             LimitReached("stopped", "", "Somebody stopped the comparison. This is the best that it had found.")
         )
     if settled.posterior.at_limit:
-        _, where = where_left(settled.after.observations, remainder_of(settled.after, settled.noise))
+        _, where = where_left(settled)
         text = (
             f"The search ended at sets of {BOUNDS.members} causes, and a larger set is more probable. What is named stays. "
             f"The named causes leave {1e3 * settled.left.rms:.2g} µm rms beyond noise. {where}"

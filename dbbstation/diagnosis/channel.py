@@ -17,9 +17,10 @@ from dbbstation.diagnosis.parts import (
     by_amplitudes,
     by_terms,
     discrepancy_of,
+    forms_of,
+    has_common,
     is_shape,
     left_open_of,
-    parts_of,
     seen_of,
 )
 from dbbstation.diagnosis.shapes import variables
@@ -349,23 +350,26 @@ class CircleChannel:
         for rows, derivative, own in zip(self.runs, derivatives, shared, strict=True):
             place = count * sets.index(own)
             samples[rows, place : place + count] = derivative
-        columns = self.columns.add(samples)
-        plausible = np.tile([p.plausible for p in own_amplitudes], len(sets))
-        positive = tuple(p.positive for p in own_amplitudes) * len(sets)
-        rough = source.form_uncertainty
-        whole = Variant(columns, plausible, nonlinear, law=source.law, positive=positive, form_uncertainty=rough)
-        found = []
-        for part in parts_of(own_amplitudes, len(sets)):
-            form = replace(whole, label=part.label, log_weight=part.log_weight)
-            if part.alike:
-                alike = self.columns.add(samples.sum(axis=1, keepdims=True))
-                form = replace(form, columns=alike, plausible=plausible[:1], whole=columns, positive=positive[:1])
-            elif part.label:
-                some = list(part.amplitudes)
-                signs = tuple(positive[k] for k in some)
-                form = replace(form, columns=columns[some], plausible=plausible[some], whole=columns, positive=signs)
-            found.append(form)
-        return found
+        forms, columns = forms_of(own_amplitudes, len(sets)), self.columns.add(samples)
+        every, plausible = columns, np.tile([p.plausible for p in own_amplitudes], len(sets))
+        positive = np.tile([p.positive for p in own_amplitudes], len(sets))
+        if has_common(forms):
+            every = np.append(columns, self.columns.add(samples.sum(axis=1, keepdims=True)))
+            plausible, positive = np.append(plausible, plausible[0]), np.append(positive, positive[0])
+        return [
+            Variant(
+                every[list(places)],
+                plausible[list(places)],
+                nonlinear,
+                label=label,
+                law=source.law,
+                whole=columns if label else columns[:0],
+                log_weight=weight,
+                positive=tuple(positive[list(places)].tolist()),
+                form_uncertainty=source.form_uncertainty,
+            )
+            for places, weight, label in forms
+        ]
 
 
 def _spacing(parameter: Parameter, value: float) -> float:

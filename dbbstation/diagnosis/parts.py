@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.layout import Layout
     from dbbstation.computing.arrays import Flags, Floats
+    from dbbstation.inference.patterns import Choices
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import BarReading
     from dbbstation.sources.contract import ErrorSource, Motion, Parameter
@@ -72,29 +73,10 @@ def by_terms(reading: BarReading, layout: Layout, x: Floats) -> Floats:
     return found
 
 
-@dataclass(frozen=True)
-class Part:
-    """One form of a cause.
+def forms_of(amplitudes: Sequence[Parameter], sets: int) -> Choices:
+    """Return forms of a cause: all amplitudes, one part, two parts that are not struts, or all struts alike.
 
-    Attributes:
-        label: strut or part; empty for all.
-        amplitudes: indices over all sets; summed if `alike`.
-    """
-
-    label: str
-    amplitudes: tuple[int, ...]
-    log_weight: float
-
-    @property
-    def alike(self) -> bool:
-        """Return whether all struts share one amplitude."""
-        return self.label == ALIKE
-
-
-def parts_of(amplitudes: Sequence[Parameter], sets: int) -> list[Part]:
-    """Return forms with log weights: all amplitudes, one part, two parts that are not struts, or all struts alike.
-
-    Kinds weigh equally, as do a kind's forms.
+    Kinds weigh equally, as do a kind's forms. The common amplitude has a column after those of all sets.
     """
     every = tuple(range(len(amplitudes) * sets))
     labels = [p.alone_with for p in amplitudes] * sets
@@ -108,8 +90,13 @@ def parts_of(amplitudes: Sequence[Parameter], sets: int) -> list[Part]:
                 [(f"{one} and {two}", tuple(sorted((*a, *b)))) for (one, a), (two, b) in combinations(alone, 2)]
             )
     if sets == 1 and [p.strut for p in amplitudes] == [*STRUT_NUMBERS]:
-        kinds.append([(ALIKE, every)])
-    return [Part(label, own, -float(np.log(len(kinds) * len(kind)))) for kind in kinds for label, own in kind]
+        kinds.append([(ALIKE, (len(every),))])
+    return tuple((own, -float(np.log(len(kinds) * len(kind))), label) for kind in kinds for label, own in kind)
+
+
+def has_common(forms: Choices) -> bool:
+    """Return whether all struts may share one amplitude."""
+    return any(label == ALIKE for _, _, label in forms)
 
 
 def variable_of(source: ErrorSource) -> str:

@@ -18,8 +18,9 @@ from dbbstation.diagnosis.parts import (
     at_point,
     by_amplitudes,
     discrepancy_of,
+    forms_of,
+    has_common,
     left_open_of,
-    parts_of,
     variable_of,
 )
 from dbbstation.diagnosis.shapes import EVERY, READING, SIGNED, UNITS, ranges, samples_of, shapes
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.compare.pairs import Sides
     from dbbstation.diagnosis.shapes import Samples, Shape
+    from dbbstation.inference.patterns import Choices
     from dbbstation.sources.contract import ErrorSource, Parameter
 
 
@@ -76,42 +78,35 @@ class Change:
 
     def law(self, log_odds: float) -> Law:
         """Return the source as a law, with forms by part and combination."""
-        amplitudes, shapes = self._amplitudes, [p for p in self._parameters if p.grid]
-        parts = parts_of(amplitudes, self._sets)
-        count = len(amplitudes) * self._sets
-        choices: list[tuple[tuple[int, ...], float, str]] = []
-        names: list[str] = []
-        units: list[str] = []
-        plausible: list[float] = []
-        for when in self._whens:
-            first = len(plausible)
-            behind = f", {when.label}" if when.label else ""
-            for k in range(count):
-                parameter = amplitudes[k % len(amplitudes)]
-                number = f" ({k // len(amplitudes) + 1})" if self._sets > 1 else ""
-                names.append(f"{parameter.name}{number}{behind}")
-                units.append(parameter.unit)
-                plausible.append(self.share * parameter.plausible)
-            if self._alike:
-                names.append(f"{ALIKE}{behind}")
-                units.append(amplitudes[0].unit)
-                plausible.append(self.share * amplitudes[0].plausible)
-            for part in parts:
-                own = (first + count,) if part.alike else tuple(first + k for k in part.amplitudes)
-                label = " ".join(text for text in (part.label, when.label) if text)
-                choices.append((own, part.log_weight - float(np.log(len(self._whens))), label))
+        shapes, whens = [p for p in self._parameters if p.grid], self._whens
+        own = [
+            (p, f"{p.name} ({number + 1})" if self._sets > 1 else p.name)
+            for number in range(self._sets)
+            for p in self._amplitudes
+        ]
+        own += [(self._amplitudes[0], ALIKE)] if self._alike else []
+        every = [(p, f"{name}, {when.label}" if when.label else name) for when in whens for p, name in own]
+        choices = tuple(
+            (
+                tuple(number * len(own) + place for place in places),
+                weight - float(np.log(len(whens))),
+                " ".join(text for text in (label, when.label) if text),
+            )
+            for number, when in enumerate(whens)
+            for places, weight, label in self._forms
+        )
         return Law(
             name=self._name(),
             columns=self.columns,
-            plausible=np.array(plausible),
-            parameters=(*names, *(p.name for p in shapes)),
-            units=(*units, *(p.unit for p in shapes)),
+            plausible=np.array([self.share * p.plausible for p, _ in every]),
+            parameters=(*(name for _, name in every), *(p.name for p in shapes)),
+            units=(*(p.unit for p, _ in every), *(p.unit for p in shapes)),
             grids=tuple(self._grid(k, p) for k, p in enumerate(shapes)),
             form_uncertainty=self.source.form_uncertainty,
             discrepancy=self._discrepancy,
             log_odds=log_odds,
             at=None if self._proportional else self._at,
-            choices=tuple(choices),
+            choices=choices,
             followed=(variable_of(self.source),),
             way="direction" if self.source.varies_with.endswith("sign") else "",
             confirm=self.source.texts.confirm,
@@ -179,8 +174,12 @@ class Change:
         return int(self._groups.max()) + 1
 
     @cached_property
+    def _forms(self) -> Choices:
+        return forms_of(self._amplitudes, self._sets)
+
+    @property
     def _alike(self) -> bool:
-        return any(part.alike for part in parts_of(self._amplitudes, self._sets))
+        return has_common(self._forms)
 
     @cached_property
     def _whens(self) -> tuple[When, ...]:

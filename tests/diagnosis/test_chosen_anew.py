@@ -23,7 +23,7 @@ def diagnosed(folder, hidden, candidates, seed, tests, rate_hz):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("tests", "parts", "rate_hz"), [(EIGHT, 8, 5.0), pytest.param(ALL, 10, 10.0, marks=pytest.mark.nightly)]
+    ("tests", "parts", "rate_hz"), [(EIGHT, 8, 3.0), pytest.param(ALL, 10, 10.0, marks=pytest.mark.nightly)]
 )
 def test_a_bent_scale_is_identified_by_tests_that_were_held_out(tmp_path, tests, parts, rate_hz):
     found = diagnosed(
@@ -46,7 +46,7 @@ FEW = ("jig-bump", "bar-scale", "bar-drift", "backlash", "gravity", "platform-jo
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("candidates", "tests", "bumped", "rate_hz"),
-    [(FEW, EIGHT, 9, 5.0), pytest.param(None, ALL, 15, 10.0, marks=pytest.mark.nightly)],
+    [(FEW, EIGHT, 9, 3.0), pytest.param(None, ALL, 15, 10.0, marks=pytest.mark.nightly)],
     ids=["few", "all"],
 )
 def test_a_bump_happened(tmp_path, candidates, tests, bumped, rate_hz):

@@ -34,7 +34,7 @@ def both(tmp_path_factory):
     plan = subset(table_ii_plan(51), EIGHT)
     hidden = [Backlash((0.0, 0.0, STRUT_3_UM, 0.0, 0.0, 0.0)), Gravity()]
     kinematics = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
-    record(folder / "s", seed=51, plan=plan, mechanisms=[kinematics, *hidden], rate_hz=5.0)
+    record(folder / "s", seed=51, plan=plan, mechanisms=[kinematics, *hidden], rate_hz=3.0)
     recorded = load_sessions([folder / "s"])
     runs = [thinned(one) for one in recorded.observations]
     explained = without_doubtful(explain(recorded.machine, runs, sources_named(FEW), lambda _: None))

@@ -48,7 +48,7 @@ def diagnosed(folder, mechanism, *more, whole=True):
     """Of all fifteen tests, or of eight with fewer readings: the sizes are many standard deviations."""
     plan = table_ii_plan(83) if whole else subset(table_ii_plan(83), EIGHT)
     record(
-        folder, seed=83, plan=plan, mechanisms=[RandomKinematics(), mechanism, *more], rate_hz=10.0 if whole else 4.0
+        folder, seed=83, plan=plan, mechanisms=[RandomKinematics(), mechanism, *more], rate_hz=10.0 if whole else 2.5
     )
     found = diagnose_sessions([folder], NAMES, (), lambda _: None).diagnosis
     return found, {f.name: f for f in found.sources if f.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}}

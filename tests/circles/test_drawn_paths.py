@@ -15,9 +15,22 @@ from dbbstation.circles.form import drawn_lines, form_and_noise
 from dbbstation.circles.strip import REACHED, strip_widths
 
 
-@pytest.mark.parametrize("sense", [1.0, -1.0])
-@pytest.mark.parametrize("upr", [0, 15])  # fewer samples than sectors are kept behind a filter
-@pytest.mark.parametrize(("count", "size"), [(450, 450), (1009, 1024)])  # 1009 is prime, so the draws are longer
+# Fewer samples than sectors are kept behind a filter; 1009 is prime, so the draws are longer. All combinations run at night.
+@pytest.mark.parametrize(
+    ("count", "size", "upr", "sense"),
+    [
+        pytest.param(
+            count,
+            size,
+            upr,
+            sense,
+            marks=() if (sense > 0.0) == ((upr == 0) == (count == 450)) else pytest.mark.nightly,
+        )
+        for count, size in ((450, 450), (1009, 1024))
+        for upr in (0, 15)
+        for sense in (1.0, -1.0)
+    ],
+)
 def test_each_sector_has_the_extremes_of_its_samples_less_the_first_lines(sense, upr, count, size, rng) -> None:
     theta_deg = np.mod(40.0 + sense * np.sort(rng.uniform(0.0, 360.0, count)), 360.0)
     lines = np.arange(count // 2 + 1)

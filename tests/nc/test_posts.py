@@ -27,7 +27,8 @@ from tests.nc.through_rs274 import MOVES, said
 
 pytestmark = needs_rs274
 
-COUNT = int(os.environ.get("DBBSTATION_FUZZ", "69"))
+COUNT = int(os.environ.get("DBBSTATION_FUZZ", "46"))
+BY_NIGHT = range(COUNT, COUNT + len(POSTS))
 
 PLACES = {"G54": (5.0, -8.0, -1000.0, 0.0, 0.0, 0.0), "G28": (0.0, 0.0, -945.0, 0.0, 0.0, 0.0)}
 LENGTHS = {1: (0.0, 0.0, 12.5, 0.0, 0.0, 0.0), 2: (0.0, 0.0, -3.25, 0.0, 0.0, 0.0)}
@@ -69,7 +70,9 @@ def along(path, done, model) -> tuple[float, list[np.ndarray]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(COUNT))
+@pytest.mark.parametrize(
+    "number", [*range(COUNT), *(pytest.param(number, marks=pytest.mark.nightly) for number in BY_NIGHT)]
+)
 def test_a_part_of_a_post_is_read_and_written(number, linuxcnc, crooked, tmp_path):
     post = POSTS[number % len(POSTS)]
     text = program(post, number // len(POSTS))

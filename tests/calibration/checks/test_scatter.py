@@ -69,9 +69,10 @@ def test_sizes_that_are_right_are_said_to_fit(as_stated, count):
 
 @pytest.mark.slow
 def test_sizes_that_are_a_third_of_the_truth_are_found_out(machine, count):
-    checks = [check_scatter(seats_of(calibration)) for calibration in sessions(machine, 1.0 / 3.0, count)]
+    """Half as many sessions do: their sizes are far off."""
+    checks = [check_scatter(seats_of(calibration)) for calibration in sessions(machine, 1.0 / 3.0, count // 2)]
     few, many = zip(*checks, strict=True)
-    assert sum(not check.fits for check in few) > 0.6 * count
+    assert sum(not check.fits for check in few) > 0.6 * len(checks)
     assert all(check.fits is False and check.interval_um[0] > check.stated_um for check in many)
 
 

@@ -108,7 +108,7 @@ def test_two_badly_seated_holders_are_both_named(recorded, sound):
 @pytest.mark.slow
 def test_a_wrong_cmm_row_is_wrong_in_every_mounting(recorded, tmp_path):
     """The same machine and plate measured twice; one row of the sheet is 30 µm off."""
-    record(tmp_path / "again", seed=9, mechanisms=[RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)], rate_hz=20.0)
+    record(tmp_path / "again", seed=9, mechanisms=[RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)], rate_hz=5.0)
     second = [
         replace(o, setup=replace(o.setup, session="again", mounting=f"again: {o.setup.mounting}"))
         for o in load_sessions([tmp_path / "again"]).observations
@@ -176,7 +176,7 @@ def test_a_test_done_in_the_wrong_bore_is_recognised(recorded, sound):
 
 
 def test_gravity_is_no_reason_to_doubt_anything(tmp_path):
-    record(tmp_path / "s", seed=9, mechanisms=[Gravity()], rate_hz=20.0)
+    record(tmp_path / "s", seed=9, mechanisms=[Gravity()], rate_hz=5.0)
     found = load_sessions([tmp_path / "s"])
     calibration, outliers = robust(found, found.observations)
     assert outliers == ()
@@ -185,12 +185,12 @@ def test_gravity_is_no_reason_to_doubt_anything(tmp_path):
 
 def test_runs_left_out_for_want_of_physics_are_taken_back_with_it_and_bumped_ones_are_not(tmp_path):
     plan = elevated(table_ii_plan(9), 8.0, ["h"])
-    record(tmp_path / "s", seed=9, plan=plan, mechanisms=[Gravity(4e-5)], rate_hz=20.0)
+    record(tmp_path / "s", seed=9, plan=plan, mechanisms=[Gravity(4e-5)], rate_hz=5.0)
     recorded = load_sessions([tmp_path / "s"])
     strange = [k for k, run in enumerate(recorded.observations) if run.test == "h"]
     bumped = number(recorded, "c", "cw")
     runs = list(recorded.observations)
-    step = np.where(np.arange(len(runs[bumped].raw)) > 200, 0.1, 0.0)
+    step = np.where(np.arange(len(runs[bumped].raw)) > 50, 0.1, 0.0)
     raw = runs[bumped].raw
     runs[bumped] = replace(runs[bumped], raw=replace(raw, length_mm=raw.length_mm + step))
     left_out = tuple(

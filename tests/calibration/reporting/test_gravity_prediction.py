@@ -133,9 +133,8 @@ def test_currents_find_the_centre_of_gravity_and_predict_as_well(tmp_path):
     assert found == pytest.approx(true, abs=0.15)  # mm; friction in the joints takes a share
 
 
-def test_programs_compensated_with_the_joint_model_cut_round_on_the_machine_itself(tmp_path):
-    folder = recorded_machine(tmp_path, 3, rubs=False, rate_hz=20.0)
-    model = joint(folder, GRAVITY).model.of_the_machine()
+def test_programs_compensated_with_the_joint_model_cut_round_on_the_machine_itself(machines, tmp_path):
+    model = joint(machines(3, rubs=False), GRAVITY).model.of_the_machine()
 
     def corrected(slot, poses):
         del slot

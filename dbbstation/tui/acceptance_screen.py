@@ -34,9 +34,12 @@ if TYPE_CHECKING:
 _WIDE = 12
 """Width of the column of test names."""
 
-_ROW = f"{{test:{_WIDE}}}  " + "{figure:18} {before:>6} {now:>6} {limit:>6} {expanded:>5}  "
 
-HEADING = _ROW.format(**texts.ACCEPTANCE_HEADING) + texts.ACCEPTANCE_HEADING["verdict"]
+def _row(test: str, figure: str, before: str, now: str, limit: str, expanded: str) -> str:
+    return f"{test:{_WIDE}}  {figure:18} {before:>6} {now:>6} {limit:>6} {expanded:>5}  "
+
+
+HEADING = _row("test", "worst figure, µm", "before", "now", "limit", "U k=2") + "verdict"
 
 _DIGEST = 8
 """Number of shown digits of a SHA-256, which people only compare."""
@@ -44,30 +47,20 @@ _DIGEST = 8
 
 def test_line(one: ToleranceOfTest) -> Content:
     """Return the row of one figure of a test: its worst circle before and now, limit, U, and verdict."""
-    row = _ROW.format(
-        test=cut(one.test, _WIDE),
-        figure=texts.FIGURE_NAMES[one.quantity],
-        before=_um(one.before),
-        now=_um(one),
-        limit=f"{one.largest_um:g}",
-        expanded=_expanded(one.worst),
-    )
-    conformity = one.conformity or str(Conformity.UNDECIDED)
-    return Content.assemble(row, (texts.CONFORMITY_WORDS[conformity], texts.CONFORMITY_STYLES[Conformity(conformity)]))
+    name, expanded = texts.FIGURE_NAMES[one.quantity], _expanded(one.worst)
+    row = _row(cut(one.test, _WIDE), name, _um(one.before), _um(one), f"{one.largest_um:g}", expanded)
+    conformity = Conformity(one.conformity or Conformity.UNDECIDED)
+    return Content.assemble(row, (texts.CONFORMITY_WORDS[conformity], texts.CONFORMITY_STYLES[conformity]))
 
 
 def worst_lines(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
     """Yield a sentence for each tolerance: the worst circle before and now, or what is missing."""
     told = [(one, one.worst) for one in answer.tolerances if one.worst is not None]
     for one, worst in told:
-        before = None if one.before is None else one.before.worst
-        yield texts.WORST.format(
-            figure=texts.FIGURE_NAMES[one.quantity],
-            before=texts.NOT_BEFORE if before is None else _circle(before),
-            now=_circle(worst),
-            limit=one.largest_um,
-            word=texts.CONFORMITY_WORDS[one.conformity or str(Conformity.UNDECIDED)],
-        )
+        before = texts.NOT_BEFORE if one.before is None or one.before.worst is None else _circle(one.before.worst)
+        word = texts.CONFORMITY_WORDS[one.conformity or Conformity.UNDECIDED]
+        name, limit = texts.FIGURE_NAMES[one.quantity], f"at most {one.largest_um:g} µm"
+        yield f"{name}: before {before}; now {_circle(worst)}; {limit}: {word}."
     if not told:
         yield from (answer.verdict.headline, *answer.verdict.to_do)
 
@@ -75,27 +68,27 @@ def worst_lines(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as obj
 def in_force_line(in_force: InForce) -> str:
     """Return the programs that commanded the circles of a session, in words."""
     if in_force.compensated == 0:
-        return texts.RUN_BY_NOMINAL if in_force.programs else texts.RUN_BY_PLAIN
+        return "nominal programs" if in_force.programs else "the control's own circles"
     if in_force.compensated < in_force.circles:
-        return texts.RUN_BY_SOME.format(count=in_force.compensated, all=in_force.circles)
-    return texts.RUN_BY_COMPENSATED
+        return f"compensated programs for {in_force.compensated} of {in_force.circles} only"
+    return "compensated programs"
 
 
 def way_back_lines(former: Former, kept: tuple[Path, ...]) -> Iterator[str]:
     """Yield lines on the files of the former models."""
     in_force = former.in_force
     if in_force.compensated == 0:
-        yield texts.WAY_BACK_NOMINAL.format(folder=former.folder)
+        yield f"Way back: before, nothing was compensated; machine and plan lie in {former.folder}."
     for path in kept:
-        yield texts.WAY_BACK_MODEL.format(path=path)
+        yield f"Way back: the model in force before is kept in {path}."
     for sha256 in in_force.lost:
-        yield texts.WAY_BACK_LOST.format(sha256=sha256[:_DIGEST])
+        yield f"Way back: the model with SHA-256 {sha256[:_DIGEST]}… was in force before and lies nowhere beside the sessions."
     if in_force.programs is not None:
-        yield texts.WAY_BACK_PROGRAMS.format(path=in_force.programs)
+        yield f"Way back: the programs that ran before lie in {in_force.programs}."
 
 
 def _circle(worst: WorstCircle) -> str:
-    return texts.WORST_CIRCLE.format(**vars(worst), expanded=_expanded(worst))
+    return f"{worst.um:.1f} µm, U {_expanded(worst)} µm ({worst.test} {worst.direction} {worst.repeat})"
 
 
 def _expanded(worst: WorstCircle | None) -> str:
@@ -155,7 +148,8 @@ class AcceptanceScreen(RowScreen):
 
     def action_former(self) -> None:
         if self._found is not None:
-            self.app.push_screen(ChooseQuestion(texts.FORMER_TITLE, self._offered()), self._accept)
+            title = "Hold this session against which one before? Arrow keys, Enter; Esc goes back."
+            self.app.push_screen(ChooseQuestion(title, self._offered()), self._accept)
 
     def action_cancel(self) -> None:
         self._after.cancel()
@@ -163,11 +157,7 @@ class AcceptanceScreen(RowScreen):
     def _offered(self) -> list[str]:
         formers = self._found.formers if self._found is not None else ()
         return [
-            texts.FORMER.format(
-                name=one.folder.name,
-                when=f"{one.measured.astimezone():%Y-%m-%d %H:%M}",
-                by=in_force_line(one.in_force),
-            )
+            f"{one.folder.name:20} {one.measured.astimezone():%Y-%m-%d %H:%M}  {in_force_line(one.in_force)}"
             for one in formers
         ]
 
@@ -205,10 +195,15 @@ class AcceptanceScreen(RowScreen):
         if self._after.former is not None and result.progress is not None:
             return self._compared(result)
         if self._after.busy is not None:
-            return texts.ACCEPTANCE_WAITS, False
+            return "Another step is being done; the acceptance can begin when that has ended.", False
         if self._found is None:
-            return texts.FORMER_LOOKS, False
-        return texts.FORMER_SOME if self._found.formers else texts.FORMER_NONE, False
+            return "Looking for sessions measured before …", False
+        return (
+            "Choose the session measured before: Enter. Then both are held against the shop's tolerances."
+            if self._found.formers
+            else "No session of the same machine, plan and jig beside this one ended before it began: there is nothing to compare.",
+            False,
+        )
 
     @staticmethod
     def _compared(result: Result) -> tuple[str, bool]:
@@ -219,9 +214,9 @@ class AcceptanceScreen(RowScreen):
             case WorkProgress.FAILED:
                 return result.failure, True
             case WorkProgress.CANCELLED:
-                return texts.ACCEPTANCE_CANCELLED, False
+                return "Ended before it was done; nothing of it was written. B chooses a session before.", False
         stage = result.stage or texts.STEP_BEGINS
-        return texts.ACCEPTANCE_BUSY.format(stage=stage, passed=duration(result.passed_s)), False
+        return f"Comparing: {stage} ({duration(result.passed_s)}). X ends it.", False
 
     def _notes(self, answer: Any) -> list[Content]:  # noqa: ANN401 - a result as objects, or None
         after = self._after

@@ -22,7 +22,6 @@ from dbbstation.service.session_notes import add_note, give_verdict, shop_degc
 from dbbstation.station.commands import AddNote, Command, Judge, Quit
 from dbbstation.station.events import Noted
 from dbbstation.station.states import FINAL, RECORDING, VERDICT, State
-from dbbstation.tui import texts
 from dbbstation.tui.board_screen import BoardScreen, Shown, ask_to_give_up
 from dbbstation.tui.help_screen import HELP, HelpScreen
 from dbbstation.tui.large_screen import LargeScreen
@@ -397,7 +396,7 @@ class StationApp(App[None]):
             if text:
                 self._note(text, None, lambda: None)
 
-        self.push_screen(TypeQuestion(texts.NOTE_TITLE), answered)
+        self.push_screen(TypeQuestion("A note for the session:"), answered)
 
     def action_brightness(self) -> None:
         self.theme = LIGHT if self.theme == DARK else DARK

@@ -100,15 +100,20 @@ class BarScreen(RowScreen):
         if self._problem or failure is not None:
             self.say(self._problem or str(failure), wrong=True)
         elif calibration.busy:
-            self.say(texts.BAR_READS.format(done=calibration.done, of=calibration.count))
+            self.say(f"Reading: {calibration.done} of {calibration.count}. Leave the bar alone.")
         elif calibration.found is not None:
             found = calibration.found
-            text = texts.BAR_DONE.format(long=found.long_um, u=found.u_um, path=found.path.name)
-            self.say(text + (texts.BAR_DRIFTED.format(drift=found.drift_um) if found.drifted else ""))
+            text = f"The bar reads {found.long_um:+.2f} µm long, standard uncertainty {found.u_um:.2f} µm. Written to {found.path.name}. Esc takes it."
+            if found.drifted:
+                text += (
+                    f" It drifted by {found.drift_um:+.2f} µm meanwhile: let the bar cool down, then B reads it again."
+                )
+            self.say(text)
         elif self._missing():
-            self.say(texts.BAR_MISSING.format(rows=", ".join(texts.BAR_ROWS[name] for name in self._missing())))
+            rows = ", ".join(texts.BAR_ROWS[name] for name in self._missing())
+            self.say(f"Still missing: {rows}. Enter changes a row.")
         else:
-            self.say(texts.BAR_READY)
+            self.say("Put the bar on the calibrator, wait until it is as warm as the shop; then B reads it.")
         self.about(Content.styled(self._live(), "bold"))
 
     def _reopen(self) -> None:
@@ -127,12 +132,12 @@ class BarScreen(RowScreen):
         if reading is None:
             return ""
         if reading.length_mm is None:
-            return texts.BAR_NO_BAR.format(said=reading.said or reading.status)
+            return f"no length yet: {reading.said or reading.status}"
         if reading.status == DOUBTFUL:
-            return texts.BAR_DOUBTFUL.format(length=reading.length_mm, said=reading.said)
+            return f"now {reading.length_mm:.4f} mm, doubtful: {reading.said}"
         off_um = self._front.off_calibrator_um(reading.length_mm, self._values)
         return (
-            texts.BAR_LIVE.format(length=reading.length_mm, off=off_um)
+            f"now {reading.length_mm:.4f} mm, {off_um:+.1f} µm against the calibrator"
             if off_um is not None
             else f"{reading.length_mm:.4f} mm"
         )

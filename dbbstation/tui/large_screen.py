@@ -11,7 +11,6 @@ from textual.widgets import Footer
 
 from dbbstation.quality.answer import Advice
 from dbbstation.station.states import RECORDING, State
-from dbbstation.tui import texts
 from dbbstation.tui.board_screen import RunScreen
 from dbbstation.tui.now_line import NowLine, TitleLine
 from dbbstation.tui.panel import Panel, lines
@@ -125,7 +124,7 @@ class LargeFigures(Panel):
             word = board.completed.answer.word
             state, state_style = str(word), LARGE_STYLES[word]
             if board.doubted:
-                state, state_style, action = texts.LARGE_BACK, LARGE_STYLES[Advice.REPEAT], "Enter"
+                state, state_style, action = "go back", LARGE_STYLES[Advice.REPEAT], "Enter"
             elif word is Advice.CANNOT_TELL:
                 action = "U"
         length = self._length(board)

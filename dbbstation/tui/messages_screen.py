@@ -10,7 +10,6 @@ from textual.screen import ModalScreen
 from textual.widgets import Static
 
 from dbbstation.service.board import Weight
-from dbbstation.tui import texts
 from dbbstation.tui.panel import Panel, lines
 
 if TYPE_CHECKING:
@@ -54,9 +53,9 @@ class MessagesScreen(ModalScreen[None]):
 
     def compose(self) -> ComposeResult:
         with VerticalScroll():
-            yield Static(Content.styled(texts.MESSAGES_TITLE, "bold"))
+            yield Static(Content.styled("Messages, the newest first. Esc or J closes.", "bold"))
             for message in self._messages:
                 word = "" if message.weight is Weight.NOTE else f"{message.weight}: "
                 yield Static(Content.styled(f"{word}{message.text}", STYLES[message.weight]))
             if not self._messages:
-                yield Static(Content(texts.MESSAGES_NONE))
+                yield Static(Content("There are none."))

@@ -64,7 +64,7 @@ class NewScreen(FrontScreen):
         if not line.instrument or not line.port:
             self._show()
             return
-        self.say(texts.NEW_ASKS.format(port=line.port, instrument=line.instrument))
+        self.say(f"Asking {line.port} for a reading of {line.instrument} …")
         self.do(lambda: self._front.probe(line), self._answered)
 
     def action_empty(self) -> None:
@@ -109,8 +109,10 @@ class NewScreen(FrontScreen):
     def _choose_bar(self) -> None:
         part, waiver = SetUpPart.BAR, self.choice.bar_waiver
         others = {
-            texts.MEASURE_BAR: self._measure_bar,
-            texts.TYPE_REASON: lambda: self._type(part, waiver, lambda why: self._take(bar=None, bar_waiver=why)),
+            "measure it now, on its calibrator …": self._measure_bar,
+            "without a calibration: type why …": lambda: self._type(
+                part, waiver, lambda why: self._take(bar=None, bar_waiver=why)
+            ),
         }
         self._choose(part, self._files(part), None, self._take_bar, others)
 
@@ -128,9 +130,7 @@ class NewScreen(FrontScreen):
         self.app.push_screen(BarScreen(self._front, line, self._take_bar))
 
     def _choose_instrument(self) -> None:
-        known = {
-            f"{name:26} {profile or texts.NO_PROFILE}": (name, profile) for name, profile in self._front.instruments()
-        }
+        known = {f"{name:26} {profile or 'usual'}": (name, profile) for name, profile in self._front.instruments()}
         now = (self.choice.line.instrument, self.choice.line.profile)
         another = {texts.TYPE_ANOTHER: lambda: self._type(SetUpPart.INSTRUMENT, "", lambda text: take((text, "")))}
 
@@ -168,7 +168,7 @@ class NewScreen(FrontScreen):
                 list(others.values())[at - len(found)]()
 
         at = found.index(now) if now in found else 0
-        title = texts.CHOOSE_TITLE.format(part=part)
+        title = f"Choose {part}: arrow keys, Enter; Esc goes back."
         self.app.push_screen(ChooseQuestion(title, [*values, *others], at), answered)
 
     def _type(self, part: SetUpPart, text: str, then: Callable[[str], None]) -> None:
@@ -199,13 +199,14 @@ class NewScreen(FrontScreen):
         self.banner(virtual=self.choice.line.virtual)
         self.put([self._row(part, missing=part in missing) for part in ROWS])
         if missing:
-            self.say(texts.NEW_MISSING.format(parts=", ".join(texts.MISSING_PARTS[part] for part in missing)))
+            parts = ", ".join(texts.MISSING_PARTS[part] for part in missing)
+            self.say(f"Still missing: {parts}. Enter changes a row.")
         else:
-            self.say(texts.NEW_COMPLETE)
+            self.say("Nothing is missing: B begins. L listens at the port.")
 
     def _row(self, part: SetUpPart, *, missing: bool) -> Content:
         sign = "!" if missing else "·"
-        value = texts.NEW_KEPT if part in self._kept() and part is not SetUpPart.FOLDER else self._value(part)
+        value = "of the session" if part in self._kept() and part is not SetUpPart.FOLDER else self._value(part)
         style = "$text-warning" if missing else ""
         return Content.assemble((f"{sign} {part:{_NAME}} ", style), (value, "bold"))
 
@@ -218,9 +219,9 @@ class NewScreen(FrontScreen):
             SetUpPart.GATE: texts.GATE_WORDS[choice.gate],
         }
         if line.virtual:
-            said[SetUpPart.BAR] = texts.VIRTUAL_BAR
+            said[SetUpPart.BAR] = "not needed: a virtual bar has the length of the plan"
         elif choice.bar_waiver:
-            said[SetUpPart.BAR] = texts.WITHOUT_BAR.format(reason=choice.bar_waiver)
+            said[SetUpPart.BAR] = f"without: {choice.bar_waiver}"
         return said.get(part) or self._field(part)
 
     def _field(self, part: SetUpPart) -> str:
@@ -242,8 +243,8 @@ class NewScreen(FrontScreen):
         self._show()
 
     def _answered(self, answer: ProbeOutcome) -> None:
-        form = texts.NEW_ANSWERS if answer.answers else texts.NEW_SILENT
-        self.say(form.format(port=answer.port, text=answer.text), wrong=not answer.answers)
+        said = f" answers: {answer.text}." if answer.answers else f": {answer.text}"
+        self.say(f"{answer.port}{said}", wrong=not answer.answers)
 
 
 _FIELDS = {

@@ -74,7 +74,7 @@ class JobScreen(FrontScreen):
     def _begin(self, choice: Choice) -> None:
         lacking = [texts.JOB_ROWS[name] for name in self._operated.job.required if not self._value(name).strip()]
         if lacking:
-            self.say(texts.JOB_REQUIRED.format(names=", ".join(lacking)), wrong=True)
+            self.say(f"Still required: {', '.join(lacking)}. Choose the row, Enter changes it.", wrong=True)
             return
 
         def sure(yes: bool | None) -> None:  # noqa: FBT001 - answer of a question
@@ -83,7 +83,8 @@ class JobScreen(FrontScreen):
                 self.do(lambda: self._checked(choice), lambda prepared: self._prepared(choice, prepared))
 
         if self._operated.left_long_ago(choice):
-            self.app.push_screen(YesQuestion(texts.JOB_OLD), sure)
+            old = "The session was left before this shift. Ball and holder must stand untouched since."
+            self.app.push_screen(YesQuestion(f"{old}\n\nY  they do, go on      N or Esc  back: begin anew"), sure)
         else:
             sure(yes=True)
 
@@ -126,34 +127,29 @@ class JobScreen(FrontScreen):
         if self._choice is None:
             return
         job, choice = self._operated.job, self._choice
-        begin = texts.JOB_GOES_ON if choice.goes_on else texts.JOB_BEGINS
+        begin = "Go on with session" if choice.goes_on else "Begin: session"
         name = "" if choice.folder is None else choice.folder.name
-        rows = [Content.styled(begin.format(session=name), "bold")]
-        rows += [Content(texts.JOB_ANEW)] if choice.goes_on else []
+        rows = [Content.styled(f"{begin} {name}", "bold")]
+        rows += [Content("Begin anew: leave that session as it is")] if choice.goes_on else []
         rows += [
             Content.assemble(f"{texts.JOB_ROWS[one]:{_NAME}} ", (self._value(one) or texts.UNNAMED, "bold"))
             for one in job.may_change
         ]
         self.banner(virtual=choice.line.virtual)
         self.put(rows)
-        self.say(texts.JOB_SAYS.format(job=job.name))
+        self.say(f"{job.name}: Enter begins; a row that may be changed is changed by Enter too.")
         self.about(lines(*(Content(text) for text in self._about())))
         self.refresh_bindings()
 
     def _about(self) -> list[str]:
         job = self._operated.job
         limits = [
-            texts.JOB_LIMIT.format(
-                figure=str(one.quantity).replace("-", " "),
-                largest=one.largest,
-                unit=one.unit,
-                tests=", ".join(one.tests) or texts.JOB_ALL_TESTS,
-            )
+            f"at most {one.largest:g} {one.unit} of {one.quantity.replace('-', ' ')}, {', '.join(one.tests) or 'all tests'}"
             for one in job.tolerances
         ]
-        by = texts.START_BY.format(instrument=job.instrument, port=job.port)
-        trouble = [texts.JOB_TROUBLE.format(text=job.trouble)] if job.trouble else []
-        return [f"{job.plan}, {job.machine}", by, *limits, *trouble, "", texts.JOB_BEFORE, *texts.CONFIRMED.values()]
+        by = f"by {job.instrument} at {job.port}"
+        trouble = [f"In trouble: {job.trouble}"] if job.trouble else []
+        return [f"{job.plan}, {job.machine}", by, *limits, *trouble, "", "Before you begin:", *texts.CONFIRMED.values()]
 
     def _prepared(self, choice: Choice, prepared: Prepared) -> None:
         if self.is_current:
@@ -203,8 +199,8 @@ class AnswerScreen(ExplainedScreen):
         self._answered: Answered | None = None
 
     def compose(self) -> ComposeResult:
-        yield Static(banner(virtual=self._virtual) + Content(f" dbbstation · {texts.ANSWER_TITLE}"), id="row-title")
-        yield Static(Content(texts.ANSWER_WAITS), id="answer-word")
+        yield Static(banner(virtual=self._virtual) + Content(" dbbstation · Answer"), id="row-title")
+        yield Static(Content("The circles are held against the limits …"), id="answer-word")
         with VerticalScroll(id="answer-why", can_focus=False):
             yield Static("", id="answer-text", markup=False)
         yield Footer(show_command_palette=False)
@@ -246,5 +242,5 @@ class AnswerScreen(ExplainedScreen):
             )
         )
         told = [*answered.reasons, "", *(f"{place}. {text}" for place, text in enumerate(answered.to_do, start=1))]
-        told += ["", texts.ANSWER_REPORT.format(path=answered.report)] if answered.report is not None else []
+        told += ["", f"The report: {answered.report}"] if answered.report is not None else []
         self.query_one("#answer-text", Static).update(Content("\n".join(told)))

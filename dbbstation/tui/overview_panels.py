@@ -12,7 +12,6 @@ from dbbstation.quality.finding import against_limit
 from dbbstation.service.board import Mark, RunDecision, problem_alone
 from dbbstation.station.commands import GoTo
 from dbbstation.station.states import State
-from dbbstation.tui import texts
 from dbbstation.tui.panel import Panel, cut, lines, window
 from dbbstation.tui.run_list import SIGNS
 from dbbstation.tui.run_list import STYLES as FINDING_STYLES
@@ -77,14 +76,20 @@ class LeftLine(Panel):
 
     def text(self, board: Board) -> Content:
         if board.state is State.FINISHED:
-            return Content(texts.THROUGH)
+            return Content(
+                "The plan is through. X takes a verdict back: what does not count any more is measured again."
+            )
         if GoTo not in board.allowed and board.state is not None:
-            return Content(texts.NOT_NOW.format(state=board.state))
+            return Content(
+                f"While the station is {board.state}, tests are looked at here; going to another and other verdicts have to wait."
+            )
         if not board.left:
-            return Content(texts.NOTHING_LEFT.format(count=len(board.tasks)))
+            return Content(f"All {len(board.tasks)} runs of the plan are accepted.")
         seconds = circles_s(self._show.tests[task.test].run(task.direction) for task in board.left)
         time = f"{seconds / 60.0:.0f} min" if seconds >= 90.0 else f"{seconds:.0f} s"  # noqa: PLR2004 - below that, minutes are coarse
-        return Content(texts.TIME_LEFT.format(left=len(board.left), count=len(board.tasks), time=time))
+        return Content(
+            f"{len(board.left)} of {len(board.tasks)} runs are left; their circles take {time} at the planned feeds, putting up balls comes on top."
+        )
 
 
 class PlateMap(Panel):
@@ -117,7 +122,7 @@ class PlateMap(Panel):
             rows += [Content("")] * gap
         elsewhere = [name for name, test in self._show.tests.items() if test.ball.bore not in bores]
         if elsewhere:
-            rows.append(Content.styled(texts.NO_BORE, "dim"))
+            rows.append(Content.styled("in no bore", "dim"))
             rows += [self._test(name, board, signs, width) for name in elsewhere]
         return lines(*rows)
 
@@ -127,7 +132,7 @@ class PlateMap(Panel):
         if number is None:
             return []
         mine = [name for name, test in self._show.tests.items() if test.ball.bore == number]
-        title = texts.BORE.format(number=number)
+        title = f"bore {number}"
         rows = [Content.styled(f" {title:{width - 1}}", "bold" if mine else "dim")]
         for name in mine:
             rows += self._directions(name, board, signs, width) if words else [self._test(name, board, signs, width)]
@@ -216,26 +221,30 @@ class ChosenRun(Panel):
         completed = self._choice.run(board, self._show)
         if completed is None:
             direction = self._choice.direction(self._show)
-            nothing = texts.NO_RUN.format(test=self._choice.test, direction=direction)
-            return lines(Content(nothing), Content(""), Content(texts.CHOOSE))
+            nothing = f"{self._choice.test} {direction}: no run yet."
+            return lines(Content(nothing), Content(""), Content("Arrow keys choose test and direction."))
         count = len(self._choice.runs(board, self._show))
         place = count - min(self._choice.back, count - 1)
-        which = texts.CHOOSE_RUN.format(place=place, count=count) if count > 1 else texts.CHOOSE_ONLY
+        which = (
+            f"Run {place} of {count} of this test and direction: H shows an earlier one. Arrow keys choose another."
+            if count > 1
+            else "No earlier run of this test and direction. Arrow keys choose another."
+        )
         return lines(Content(_figures(completed)), _decided(board, completed), Content(which))
 
 
 def _figures(completed: RunCompleted) -> str:
     label, figures = completed.run.label, completed.figures
     if figures is None:
-        return texts.NO_CIRCLE.format(run=label, problem=problem_alone(completed))
+        return f"{label}: no circle; {problem_alone(completed)}"
     x, y = (1e3 * part for part in figures.centre_mm)
     mean, circularity = figures.mean_radial_error_um, figures.circularity_um
-    return texts.RUN_FIGURES.format(run=label, x=x, y=y, mean=mean, circularity=circularity)
+    return f"{label}: centre X {x:+.1f} Y {y:+.1f}, mean {mean:+.1f}, circularity {circularity:.1f} µm."
 
 
 def _decided(board: Board, completed: RunCompleted) -> Content:
     label = completed.run.label
-    verdict = board.verdicts.get(label, RunDecision.NONE).value or texts.NO_VERDICT
+    verdict = board.verdicts.get(label, RunDecision.NONE).value or "waits for its verdict"
     reason = board.reasons.get(label, "")
     parts = [Content(f"{verdict}: {reason}" if reason else verdict)]
     parts += [

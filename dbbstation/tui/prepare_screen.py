@@ -102,8 +102,10 @@ class PrepareScreen(FrontScreen):
             if at is not None:
                 self._write(None if at == 0 else models[at - 1])
 
-        labels = [texts.PROGRAMS_NOMINAL, *(texts.PROGRAMS_BY.format(model=path) for path in models)]
-        self.app.push_screen(ChooseQuestion(texts.PROGRAMS_TITLE, labels), answered)
+        labels = ["nominal: the plain circles of the plan", *(f"compensated with {path}" for path in models)]
+        self.app.push_screen(
+            ChooseQuestion("Write NC programs of all circles: arrow keys, Enter; Esc goes back.", labels), answered
+        )
 
     def action_begin(self) -> None:
         if len(self._confirmed) < len(self._list):
@@ -125,7 +127,11 @@ class PrepareScreen(FrontScreen):
         self.put(rows)
         self._tell()
         left = len(self._list) - len(self._confirmed)
-        self.say(texts.CHECK_OPEN.format(count=left, all=len(self._list)) if left else texts.CHECK_READY)
+        self.say(
+            f"Still to be confirmed: {left} of {len(self._list)}. Enter confirms one, Y all."
+            if left
+            else "Everything is confirmed: B begins."
+        )
 
     def _tell(self) -> None:
         told = tuple(self._checked())
@@ -137,71 +143,72 @@ class PrepareScreen(FrontScreen):
         prepared = self._prepared
         if self._line is not None:
             yield self._reading(self._line)
-        yield _GOOD, texts.CHECK_TRAVEL
-        form = texts.CHECK_LEFT if self._goes_on else texts.CHECK_TIME
-        time = duration(prepared.circles_s)
-        yield _GOOD, form.format(runs=prepared.runs, time=time, mountings=prepared.mountings)
+        yield _GOOD, "Every circle and its feed-in lie within the travel of axes, angles and struts."
+        runs = f"{'Left to do: ' if self._goes_on else ''}{prepared.runs} runs"
+        circles = f"their circles take {duration(prepared.circles_s)} at the planned feeds"
+        yield _GOOD, f"{runs}; {circles}. {prepared.mountings} times a ball is put up, which comes on top."
         if not self._goes_on:
-            r = prepared.height_and_drift
-            form = texts.CHECK_MIXED if prepared.mixes_drift else texts.CHECK_ORDER
-            yield _NOTE if prepared.mixes_drift else _GOOD, form.format(r=r)
+            correlate = f"Heights and a steady drift correlate by {prepared.height_and_drift:.2f}"
+            seen = "a drift can look like an effect of height" if prepared.mixes_drift else "each can be seen"
+            yield _NOTE if prepared.mixes_drift else _GOOD, f"{correlate}: {seen}."
         if prepared.job.programs:
             yield _GOOD, self._programs()
         else:
-            yield _NOTE, self._wrote or texts.CHECK_NO_PROGRAMS
+            yield _NOTE, self._wrote or "The control runs plain circles; W writes NC programs of them."
         if prepared.line.virtual:
-            yield _NOTE, texts.CHECK_VIRTUAL
+            yield _NOTE, "Machine, bar and instrument are virtual."
         yield from self._shop()
 
     def _reading(self, line: HeldLine) -> tuple[str, str]:
         latest, first = line.latest, self._prepared.first
         if line.failure is not None:
-            return _OPEN, texts.CHECK_SILENT.format(why=line.failure, again_s=AGAIN_S)
+            return _OPEN, f"{line.failure}. It is opened again every {AGAIN_S:.0f} s."
         if latest is None:
-            return _NOTE, texts.CHECK_LISTENS
-        rate = "" if line.rate.per_s is None else texts.RATE.format(rate=line.rate.per_s)
+            return _NOTE, "The instrument is opened …"
+        rate = "" if line.rate.per_s is None else f", {line.rate.per_s:.0f} times a second"
         if latest.length_mm is None:
-            return _GOOD, texts.CHECK_NO_BAR.format(rate=rate, said=latest.said or latest.status)
+            return _GOOD, f"The instrument answers{rate}: no bar, {latest.said or latest.status}."
+        reads = f"The instrument reads {latest.length_mm:.4f} mm{rate}"
         if latest.status == DOUBTFUL:
-            return _OPEN, texts.CHECK_DOUBTFUL.format(length=latest.length_mm, rate=rate, said=latest.said)
+            return _OPEN, f"{reads}, doubtful: {latest.said}."
         if first is None:
-            return _GOOD, texts.CHECK_READS_ALL.format(length=latest.length_mm, rate=rate)
-        seat_now = seat_words(seat(latest.length_mm, first))
-        return _GOOD, texts.CHECK_READS.format(length=latest.length_mm, rate=rate, seat=seat_now)
+            return _GOOD, f"{reads}."
+        return _GOOD, f"{reads}; for the first circle the bar is {seat_words(seat(latest.length_mm, first))}."
 
     def _programs(self) -> str:
         programs = self._prepared.job.programs.values()
-        models = {program.model_sha256[:12] for program in programs if program.model_sha256}
-        by = texts.CHECK_COMPENSATED.format(models=", ".join(sorted(models))) if models else texts.CHECK_NOMINAL
+        models = sorted({program.model_sha256[:12] for program in programs if program.model_sha256})
+        by = f"compensated with the model {', '.join(models)} (SHA-256)" if models else "nominal"
         where = "" if self._choice.programs is None else str(self._choice.programs)
-        return texts.CHECK_PROGRAMS.format(count=len(programs), by=by, folder=where).rstrip()
+        return f"{len(programs)} NC programs run the circles that they are named after, {by}. {where}".rstrip()
 
     def _shop(self) -> Iterator[tuple[str, str]]:
         choice, details = self._choice, self._prepared.job.details
         bar = details.bar
         if not self._goes_on and bar is not None and bar.calibrated is not None:
             when = f"{bar.calibrated.astimezone():%Y-%m-%d %H:%M}"
-            yield _GOOD, texts.CHECK_BAR.format(serial=bar.serial_number, when=when)
+            yield _GOOD, f"The bar {bar.serial_number} was on its calibrator, at {when}."
         elif not self._goes_on and details.bar_waiver:
-            yield _OPEN, texts.CHECK_WAIVED.format(reason=details.bar_waiver)
+            yield _OPEN, f"The bar is not calibrated: {details.bar_waiver}"
         if choice.ambient_temp_c is None:
-            yield _OPEN, texts.CHECK_NO_TEMPERATURE
+            unread = "The temperature of the shop was not read: T takes it."
+            yield _OPEN, f"{unread} What the bar grows by is not known without."
         else:
-            yield _GOOD, texts.CHECK_TEMPERATURE.format(temp=choice.ambient_temp_c)
+            yield _GOOD, f"Temperature of the shop before: {choice.ambient_temp_c:g} °C."
         if self._goes_on:
-            yield _NOTE, texts.CHECK_OLD
+            yield _NOTE, "The session keeps bar and shop as it has noted them."
             return
-        names = {"serial": choice.serial_number, "operator": choice.operator, "job": choice.job}
-        yield _NOTE, texts.CHECK_WHO.format(**{name: text or texts.UNNAMED for name, text in names.items()})
+        names = (text or texts.UNNAMED for text in (choice.serial_number, choice.operator, choice.job))
+        yield _NOTE, "Machine {}, operator {}, job {}.".format(*names)
 
     def _write(self, model: Path | None) -> None:
-        self.say(texts.CHECK_WRITES)
+        self.say("Writing NC programs …")
         choice = self._choice
 
         def written(found: tuple[int, Path]) -> None:
             count, folder = found
             if model is None:
-                self._wrote = texts.CHECK_WROTE.format(count=count, folder=folder)
+                self._wrote = f"{count} NC programs written to {folder}."
                 self._show()
             else:
                 # The session has to know what commands its runs: its circles are no longer the plan's.

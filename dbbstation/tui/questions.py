@@ -60,7 +60,7 @@ class TypeQuestion(ModalScreen[str | None]):
     def compose(self) -> ComposeResult:
         with Vertical():
             yield Static(self._title, markup=False)
-            yield Input(value=self._text, placeholder=texts.TYPED)
+            yield Input(value=self._text, placeholder="type it, then Enter; Esc goes back")
 
     def on_input_submitted(self, submitted: Input.Submitted) -> None:
         self.dismiss(submitted.value.strip())
@@ -91,16 +91,16 @@ class ReasonQuestion(ModalScreen[str | None]):
 
     def __init__(self, run: str, *, counts: bool = False) -> None:
         super().__init__()
-        self._run_label = run
         self._reasons = texts.ALL_THE_SAME if counts else texts.REASONS
-        self._title = texts.REASON_TITLE_COUNTS if counts else texts.REASON_TITLE
+        wrong = f"Something is wrong with {run}. Why does it count all the same?"
+        self._title = wrong if counts else f"Why does {run} not count?"
 
     def compose(self) -> ComposeResult:
-        told = [*self._reasons, texts.REASON_ANOTHER]
+        told = [*self._reasons, "type another reason"]
         reasons = "\n".join(f"{number}  {reason}" for number, reason in enumerate(told, start=1))
         with Vertical():
-            yield Static(f"{self._title.format(run=self._run_label)}\n\n{reasons}\n\n{texts.REASON_KEYS}", markup=False)
-            yield Input(placeholder=texts.REASON_TYPED, disabled=True)
+            yield Static(f"{self._title}\n\n{reasons}\n\nEsc  leaves it as it is", markup=False)
+            yield Input(placeholder="type the reason, then Enter", disabled=True)
 
     def action_because(self, number: int) -> None:
         if number <= len(self._reasons):

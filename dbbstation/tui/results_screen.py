@@ -61,16 +61,16 @@ def _diagnosed(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as obje
     for verdict, words in texts.VERDICT_WORDS.items():
         names = [cause.name for cause in answer.sources if cause.verdict == verdict]
         if names:
-            yield texts.CAUSES.format(verdict=words, names=", ".join(names))
+            yield f"{words}: {', '.join(names)}"
     yield answer.unexplained.text
     yield from ending_sentences(answer)
 
 
 def _programmed(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
-    yield texts.PROGRAMMED.format(count=len(answer.programs), dialect=answer.dialect)
+    yield f"{len(answer.programs)} programs for {answer.dialect}, all within the machine's travel."
     greatest = [one.greatest_correction_um for one in answer.programs if one.greatest_correction_um is not None]
     if greatest:
-        yield texts.CORRECTED.format(most=max(greatest))
+        yield f"The greatest correction is {max(greatest):.1f} µm."
 
 
 def _reported(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
@@ -87,7 +87,7 @@ def _accepted(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objec
 
 
 def _drawn(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
-    yield texts.DRAWN.format(count=sum(hasattr(run, "g_um") for run in answer.runs))
+    yield f"{sum(hasattr(run, 'g_um') for run in answer.runs)} circles are drawn."
 
 
 def _over_time(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
@@ -108,11 +108,6 @@ _LINES: dict[SessionTask, Callable[[Any], Iterator[str]]] = {
 
 
 STEPS = tuple(SessionTask)
-_STYLES = {
-    WorkProgress.DONE: "$text-success",
-    WorkProgress.FAILED: "$text-error",
-    WorkProgress.CANCELLED: "$text-warning",
-}
 
 
 class ResultsScreen(RowScreen):
@@ -190,7 +185,12 @@ class ResultsScreen(RowScreen):
                 self._after.cancel()
                 self.dismiss()
 
-        self.app.push_screen(YesQuestion(texts.RESULTS_LEAVE), answered)
+        self.app.push_screen(
+            YesQuestion(
+                "A step is being done. End it and go back?\n\nWhat is done already stays.\n\nY  end it      N or Esc  go on"
+            ),
+            answered,
+        )
 
     def _begin(self, *steps: SessionTask) -> None:
         self._go_to(steps[0])
@@ -207,9 +207,9 @@ class ResultsScreen(RowScreen):
         self.put([_row(step, after.results[step]) for step in STEPS])
         self.about(self._found(STEPS[self.at]))
         if after.busy is not None:
-            self.say(texts.RESULTS_BUSY)
+            self.say("Working; K ends the step, Esc goes back.")
         else:
-            self.say(texts.RESULTS_IDLE.format(folder=after.folder))
+            self.say(f"Enter does the chosen step, 0 the first four; results go to {after.folder}.")
         self.keys_by((after.busy, after.model))
 
     def _found(self, step: SessionTask) -> Content:
@@ -221,18 +221,16 @@ class ResultsScreen(RowScreen):
             case WorkProgress.FAILED:
                 return Content.styled(result.failure, "$text-error")
             case WorkProgress.CANCELLED:
-                return Content(texts.RESULTS_CANCELLED)
+                return Content("Ended before it was done; nothing of it was written.")
             case WorkProgress.RUNNING:
                 return Content("")
         if step is SessionTask.PROGRAMS and self._after.model is None:
-            return Content(texts.RESULTS_NO_MODEL)
-        return Content.styled(texts.RESULTS_EMPTY, "dim")
+            return Content("Programs need a model: 1 calibrates, 2 diagnoses.")
+        return Content.styled("Nothing yet.", "dim")
 
 
 def _row(step: SessionTask, result: Result) -> Content:
     key, title = texts.STEPS[step]
-    words = texts.STEP_WORDS[result.progress].format(
-        stage=result.stage or texts.STEP_BEGINS, passed=duration(result.passed_s)
-    )
-    style = _STYLES.get(result.progress, "") if result.progress else "dim"
-    return Content.assemble(f"{texts.STEP_SIGNS[result.progress]} ", (key, "bold"), f"  {title:48} ", (words, style))
+    sign, words, style = texts.STEP_LOOKS[result.progress]
+    words = words.format(stage=result.stage or texts.STEP_BEGINS, passed=duration(result.passed_s))
+    return Content.assemble(f"{sign} ", (key, "bold"), f"  {title:48} ", (words, style))

@@ -63,7 +63,7 @@ class StartScreen(FrontScreen):
         if line is None:
             return
         if line.problem:
-            self.say(texts.START_BROKEN.format(folder=line.folder.name, problem=line.problem), wrong=True)
+            self.say(f"{line.folder.name} cannot be gone on with: {line.problem}", wrong=True)
             return
         choice = self._front.goes_on_with(line.folder)
         if choice.missing():
@@ -91,7 +91,11 @@ class StartScreen(FrontScreen):
     def _list(self, sessions: tuple[SessionLine, ...]) -> None:
         self._sessions = sessions
         self.put([_row(line) for line in sessions])
-        self.say(texts.START_SOME if sessions else texts.START_NONE)
+        self.say(
+            texts.START_SOME
+            if sessions
+            else "No session yet. N begins a new one, V tries everything on a virtual machine, without hardware."
+        )
         self._tell()
         self.refresh_bindings()
 
@@ -117,10 +121,9 @@ class StartScreen(FrontScreen):
             self.about(Content(f"{line.folder}\n{line.problem}"))
         else:
             by = self._front.goes_on_with(line.folder).line
-            what = texts.START_WHAT.format(folder=line.folder, plan=line.plan, machine=line.machine)
-            known = by.instrument and by.port
-            how = texts.START_BY.format(instrument=by.instrument, port=by.port) if known else texts.START_NO_LINE
-            self.about(Content(f"{what}\n{how}"))
+            known = f"by {by.instrument} at {by.port}"
+            how = known if by.instrument and by.port else "no instrument yet: I chooses one"
+            self.about(Content(f"{line.folder}\nplan {line.plan}, machine {line.machine}\n{how}"))
         self.refresh_bindings()
 
 
@@ -130,11 +133,11 @@ def _row(line: SessionLine) -> Content:
     if line.problem:
         return Content.assemble((f"! {name} ", "$text-error"), f"{cut(line.problem, 52)}")
     if line.complete:
-        state = texts.START_COMPLETE
+        state = "complete"
     else:
-        state = texts.START_RUNS.format(accepted=line.accepted, planned=line.planned)
-        state += texts.START_LEFT.format(time=duration(line.left_s)) if line.left_s else ""
-    state = f"{texts.VIRTUAL_WORD}, {state}" if line.virtual else state
-    state += texts.START_UNJUDGED.format(count=line.unjudged) if line.unjudged else ""
+        state = f"{line.accepted} of {line.planned} runs"
+        state += f", {duration(line.left_s)} left" if line.left_s else ""
+    state = f"virtual, {state}" if line.virtual else state
+    state += f", {line.unjudged} to judge" if line.unjudged else ""
     sign = "✓" if line.complete else "◐"
     return Content.assemble(f"{sign} {name} {when}  ", (state, "bold"))

@@ -9,7 +9,6 @@ import pytest
 
 from dbbstation.files.places import shipped_folder
 from dbbstation.service.work import SessionTask
-from dbbstation.tui import texts
 from dbbstation.tui.results_screen import result_lines
 from tests.cli.conftest import call
 
@@ -71,8 +70,8 @@ def test_a_diagnosis_lists_causes_by_what_is_known_of_them() -> None:
     lines = result_lines(SessionTask.DIAGNOSE, answer)
     assert lines[:2] == answer["said"]
     assert "by 9.30 µm rms beyond noise (probability by chance below 1e-99)" in lines[2]
-    assert texts.CAUSES.format(verdict=texts.VERDICT_WORDS["identified"], names="gravity") in lines
-    assert texts.CAUSES.format(verdict=texts.VERDICT_WORDS["ambiguous"], names="backlash") in lines
+    assert "Identified causes: gravity" in lines
+    assert "Ambiguous: backlash" in lines
     assert lines[-2] == "Nothing is left beyond noise."
     assert lines[-1].startswith("measure next: no proposal")
     proposed = {"text": "a circle", "source": "backlash", "sigma_before": 4.0, "sigma_after": 1.0, "unit": "µm"}
@@ -93,6 +92,9 @@ def test_a_diagnosis_lists_causes_by_what_is_known_of_them() -> None:
 def test_the_greatest_correction_of_all_programs_is_told() -> None:
     programs = [{"greatest_correction_um": value} for value in (62.1, None, 207.5)]
     lines = result_lines(SessionTask.PROGRAMS, {"programs": programs, "dialect": "linuxcnc"})
-    assert lines == [texts.PROGRAMMED.format(count=3, dialect="linuxcnc"), texts.CORRECTED.format(most=207.5)]
+    assert lines == [
+        "3 programs for linuxcnc, all within the machine's travel.",
+        "The greatest correction is 207.5 µm.",
+    ]
     nominal = [{"greatest_correction_um": None}]
     assert len(result_lines(SessionTask.PROGRAMS, {"programs": nominal, "dialect": "linuxcnc"})) == 1

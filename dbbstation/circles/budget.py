@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import sqrt
 from typing import TYPE_CHECKING, Annotated
@@ -120,9 +120,8 @@ def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowled
         # The mean of readings is along the bar, the radius in the plane of the circle.
         scale = 1.0 if quantity is BudgetQuantity.MEAN_RADIAL else along
         value = one.mean_radial_error_um if quantity is BudgetQuantity.MEAN_RADIAL else one.radius_error_um
-        length = _length_terms(one, known, scale)
-        terms = {BudgetTerm.NOISE: scale * slow_noise_um(one, 0) / np.sqrt(len(one.raw)), **length.terms}
-        return _budget(quantity, terms, (*length.missing, *NOT_STATED), value, value, _why_not(one, quantity, known))
+        terms, lacking = _length_terms(one, known, scale)
+        return _budget(quantity, terms, (*lacking, *NOT_STATED), value, value, _why_not(one, quantity, known))
     axis = 0 if quantity is BudgetQuantity.X else 1
     across_um = 1e3 * one.centre_mm[1 - axis]
     value = 1e3 * one.centre_mm[axis]
@@ -158,9 +157,9 @@ def _range(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge)
     terms = _of_extremes(one, 1 if quantity in ABSOLUTE else 2)
     missing = NOT_STATED
     if quantity in ABSOLUTE:
-        length = _length_terms(one, known, along)
-        terms |= {BudgetTerm.NOISE: along * slow_noise_um(one, 0) / np.sqrt(len(one.raw)), **length.terms}
-        missing = (*length.missing, *NOT_STATED)
+        length, lacking = _length_terms(one, known, along)
+        terms |= length
+        missing = (*lacking, *NOT_STATED)
     why = _why_not(one, quantity, known)
     found = estimate_of(one, quantity)
     if found is None:
@@ -250,25 +249,22 @@ def _pair_range(pair: PairAnalysis, quantity: BudgetQuantity) -> Budget:
     return _budget(quantity, terms, NOT_STATED, found.value_um, read)
 
 
-@dataclass
-class _Draft:
-    terms: dict[BudgetTerm, float] = field(default_factory=dict)
-    missing: list[str] = field(default_factory=list)
-
-
-def _length_terms(one: CircleAnalysis, known: SetUpKnowledge, scale: float) -> _Draft:
-    draft = _Draft()
+def _length_terms(
+    one: CircleAnalysis, known: SetUpKnowledge, scale: float
+) -> tuple[dict[BudgetTerm, float], list[str]]:
+    terms = {BudgetTerm.NOISE: scale * slow_noise_um(one, 0) / float(np.sqrt(len(one.raw)))}
+    missing = list[str]()
     for cause, size in ((BudgetTerm.BAR, known.u_bar_um), (BudgetTerm.TEMPERATURE, known.u_temperature_um)):
         if size is None:
-            draft.missing.append(cause.value)
+            missing.append(cause.value)
         else:
-            draft.terms[cause] = scale * size
+            terms[cause] = scale * size
     if one.raw.circle.elevation_deg:
-        draft.missing.append("height of the tool tip above the ball")
+        missing.append("height of the tool tip above the ball")
         if known.u_ball_z_um is not None:
             rise = abs(float(np.tan(np.radians(one.raw.circle.elevation_deg))))
-            draft.terms[BudgetTerm.MOUNTING] = rise * known.u_ball_z_um
-    return draft
+            terms[BudgetTerm.MOUNTING] = rise * known.u_ball_z_um
+    return terms, missing
 
 
 def _closure_um(one: CircleAnalysis) -> float:

@@ -134,17 +134,17 @@ def quick_look(turns: Sequence[CircleAnalysis]) -> QuickLook | None:
     cut = [_turn(one) for one in turns]
     fit = _best(_fits(cut))
     waves = {axis: _cyclic(cut, fit, axis) for axis in ("X", "Y")}
-    strongest, other = sorted(waves, key=lambda axis: waves[axis].gained, reverse=True)
-    shown = [waves[strongest].columns] if waves[strongest].symptom.seen else []
+    strongest, other = sorted(waves, key=lambda axis: waves[axis][1].gained, reverse=True)
+    shown = [wave.columns for symptom, wave in [waves[strongest]] if symptom.seen]
     if shown:
         fit = _fitted(cut, fit.spike_deg, shown)
         waves[other] = _cyclic(cut, fit, other)
-        shown += [waves[other].columns] if waves[other].symptom.seen else []
+        shown += [wave.columns for symptom, wave in [waves[other]] if symptom.seen]
     fits = _fits(cut, shown)
     fit = _best(fits)
     sigma_um = _sigma_um(cut, fit)
     return QuickLook(
-        symptoms=(*_symptoms(fits, sigma_um, both=len(turns) > 1), *(waves[axis].symptom for axis in sorted(waves))),
+        symptoms=(*_symptoms(fits, sigma_um, both=len(turns) > 1), *(waves[axis][0] for axis in sorted(waves))),
         form_rms_um=_rms(np.concatenate([turn.deviation_um for turn in cut])),
         left_rms_um=_rms(fit.left_um),
         spike_deg=fit.spike_deg,
@@ -260,20 +260,22 @@ def _with_length(one: Symptom, fit: _Fit) -> Symptom:
 
 @dataclass(frozen=True, eq=False)
 class _Wave:
-    symptom: Symptom
-    columns: Floats
     gained: float
+    period_mm: float
+    size: Floats
+    columns: Floats
+    beside: Floats
 
 
-def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
+def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> tuple[Symptom, _Wave]:
     diameter_mm = 2.0 * turns[0].one.raw.circle.radius_mm
 
-    def trial(periods: float) -> _Trial:
+    def trial(periods: float) -> _Wave:
         period_mm = diameter_mm / periods
         waves = np.vstack([cyclic_shapes(turn.theta_deg, turn.one.raw.circle, axis, period_mm) for turn in turns])
         beside = waves - fit.basis @ (fit.basis.T @ waves)
         size = np.asarray(np.linalg.solve(beside.T @ beside, beside.T @ fit.left_um), dtype=np.float64)
-        return _Trial(float(fit.left_um @ beside @ size), period_mm, size, waves, beside)
+        return _Wave(float(fit.left_um @ beside @ size), period_mm, size, waves, beside)
 
     coarse = max((trial(float(periods)) for periods in PERIODS), key=lambda one: one.gained)
     near = diameter_mm / coarse.period_mm
@@ -282,7 +284,7 @@ def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
 
     fine = minimize_scalar(lambda periods: -trial(periods).gained, bounds=(near - step, near + step), method="bounded")
     found = max(coarse, trial(float(fine.x)), key=lambda one: one.gained)
-    gained, size, waves, beside = found.gained, found.size, found.waves, found.beside
+    size, beside = found.size, found.beside
     sigma_um = _sigma_um(turns, replace(fit, left_um=fit.left_um - beside @ size))
     covariance = sigma_um**2 * np.linalg.inv(beside.T @ beside)
     amplitude = hypot_of(*size)
@@ -291,24 +293,15 @@ def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
     u = sqrt(along @ covariance @ along)
     # Half of the reduction of squares is exponentially distributed in each trial [two degrees of freedom].
     limit = 2.0 * float(np.log(2 * len(PERIODS) / CHANCE)) * sigma_um**2
-    if gained <= limit:
+    if found.gained <= limit:
         # The strongest of many insignificant waves is no estimate, but an upper bound.
         below = amplitude + ONE_SIDED * u
         symptom = Symptom(Signature.CYCLIC, axis, None, None, below, "µm", seen=False, text=f"below {below:.2g} µm")
-        return _Wave(symptom, waves, gained)
+        return symptom, found
     # Noise perpendicular to a wave's phasor lengthens it by variance over twice its size.
     size_um = sqrt(max(amplitude**2 - across @ covariance @ across, 0.0))
     symptom = Symptom(Signature.CYCLIC, axis, size_um, u, None, "µm", seen=True, text=f"every {found.period_mm:.1f} mm")
-    return _Wave(symptom, waves, gained)
-
-
-@dataclass(frozen=True, eq=False)
-class _Trial:
-    gained: float
-    period_mm: float
-    size: Floats
-    waves: Floats
-    beside: Floats
+    return symptom, found
 
 
 def _rms(values: Floats) -> float:

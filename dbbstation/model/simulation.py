@@ -69,15 +69,5 @@ def simulate_circle(
 
 def setup_of(test: PlannedTest) -> Setup:
     """Return a planned test's set-up with one mounting."""
-    ball = test.ball
-    return Setup(
-        session="",
-        mounting=test.name,
-        ball=ball.name,
-        instrument="",
-        fixed_ball_mm=np.array(ball.centre_mm),
-        mounting_repeatability_mm=ball.repeatability_mm,
-        ball_uncertainty_mm=ball.uncertainty_mm,
-        bar_uncertainty_mm=0.0,
-        plate=ball.plate,
-    )
+    ball = replace(test.ball, place_known=True)
+    return Setup.on(ball, session="", mounting=test.name, instrument="", bar_uncertainty_mm=0.0)

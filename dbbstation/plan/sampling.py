@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.facts import of_facts
 from dbbstation.facts.quantities import FULL_TURN_DEG
 
 if TYPE_CHECKING:
@@ -24,41 +23,14 @@ SMALLEST_POINTS = 36
 
 
 @dataclass(frozen=True)
-class Sampling:
-    """Readings on one turn."""
-
-    points_per_turn: float
-    spacing_deg: float
-    highest_undulation: int
-
-    @property
-    def enough(self) -> bool:
-        """Return whether all figures are resolved."""
-        return self.highest_undulation >= UNDULATIONS
-
-    @property
-    def is_circle(self) -> bool:
-        """Return whether the points are dense enough for a circle."""
-        return self.points_per_turn >= SMALLEST_POINTS
-
-
-def sampling(circle: Circle, rate_hz: float) -> Sampling:
-    """Return how densely a sample rate covers a circle."""
-    points = rate_hz * FULL_TURN_DEG / circle.turning_deg_s
-    return Sampling(points, FULL_TURN_DEG / points, int(points / POINTS_PER_UNDULATION))
-
-
-def enough_feed_mm_min(circle: Circle, rate_hz: float) -> float:
-    """Return the greatest feed that still resolves all figures [mm/min]."""
-    return circle.feed_mm_min * sampling(circle, rate_hz).points_per_turn / (UNDULATIONS * POINTS_PER_UNDULATION)
-
-
-@dataclass(frozen=True)
 class SampledCircle:
     """The readings of an instrument on one circle.
 
     Attributes:
         spacing_deg: between readings.
+        enough: all figures are resolved.
+        is_circle: the points are dense enough for a circle.
+        greatest_feed_mm_min: greatest feed that still resolves all figures.
     """
 
     test: str
@@ -72,14 +44,26 @@ class SampledCircle:
     greatest_feed_mm_min: float
 
 
+def sampled(circle: Circle, rate_hz: float, test: str = "") -> SampledCircle:
+    """Return how densely a sample rate covers a circle."""
+    points = rate_hz * FULL_TURN_DEG / circle.turning_deg_s
+    highest = int(points / POINTS_PER_UNDULATION)
+    return SampledCircle(
+        test=test,
+        feed_mm_min=circle.feed_mm_min,
+        readings_per_second=rate_hz,
+        points_per_turn=points,
+        spacing_deg=FULL_TURN_DEG / points,
+        highest_undulation=highest,
+        enough=highest >= UNDULATIONS,
+        is_circle=points >= SMALLEST_POINTS,
+        greatest_feed_mm_min=circle.feed_mm_min * points / (UNDULATIONS * POINTS_PER_UNDULATION),
+    )
+
+
 def sampled_circles(plan: Plan, rate_hz: float) -> tuple[SampledCircle, ...]:
     """Return an instrument's readings of each circle of a plan."""
-    found = []
-    for name, test in plan.tests.items():
-        seen, greatest = sampling(test.circle, rate_hz), enough_feed_mm_min(test.circle, rate_hz)
-        own = {"test": name, "readings_per_second": rate_hz, "greatest_feed_mm_min": greatest}
-        found.append(of_facts(SampledCircle, seen, test.circle, **own))
-    return tuple(found)
+    return tuple(sampled(test.circle, rate_hz, name) for name, test in plan.tests.items())
 
 
 def sampling_notes(plan: Plan, label: str, rate_hz: float) -> Iterator[str]:

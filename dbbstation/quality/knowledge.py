@@ -13,7 +13,7 @@ from dbbstation.circles.analysis import CircleAnalysis, analyse, feed_shown
 from dbbstation.computing.arrays import hypot_of, norm_of
 from dbbstation.errors import TraceError
 from dbbstation.inference.harmonics import SAMPLES_PER_HARMONIC, amplitudes
-from dbbstation.trace.cut import FeedingWay, cut, edges_of, feeding_ways, lost_on_turn, unusable_on_turn
+from dbbstation.trace.cut import FeedingWay, cut, edges_of, feeding_ways, lost_on_turn
 from dbbstation.trace.expected import COEFFICIENTS, HIGHEST_HARMONIC, LOCAL_COEFFICIENTS, LOCAL_HARMONIC
 
 if TYPE_CHECKING:
@@ -134,8 +134,8 @@ class Seen:
 
 def seen(run: Run) -> Seen:
     """Cut and analyse a run."""
-    lost = lost_on_turn(run.recording, run.circle)
-    unusable = unusable_on_turn(run.recording, run.circle)
+    *counts, unusable = lost_on_turn(run.recording, run.circle)
+    lost = counts[0], counts[1]
     try:
         analysis = analyse(cut(run.recording, run.circle), run.recording)
     except TraceError as error:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.machine.geometry import Compliance, Hexapod, Machine
-    from dbbstation.plan.plan import Plate
+    from dbbstation.plan.plan import Ball, Plate
     from dbbstation.trace.columns import Logged
 
 
@@ -154,6 +154,22 @@ class Setup:
     bar_length_mm: float | None = None
     moving_s: tuple[tuple[float, float], ...] = ()
     thermometers: Mapping[str, Thermometer] = field(default_factory=dict)
+
+    @classmethod
+    def on(cls, ball: Ball, *, session: str, mounting: str, instrument: str, bar_uncertainty_mm: float) -> Self:
+        """Return the set-up of a bar on a ball of the plan."""
+        return cls(
+            session=session,
+            mounting=mounting,
+            ball=ball.name,
+            instrument=instrument,
+            fixed_ball_mm=np.array(ball.centre_mm, dtype=np.float64),
+            mounting_repeatability_mm=ball.repeatability_mm,
+            ball_uncertainty_mm=ball.uncertainty_mm,
+            bar_uncertainty_mm=bar_uncertainty_mm,
+            place_known=ball.place_known,
+            plate=ball.plate,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dbbstation.errors import StationError
     from dbbstation.instrument.reading import Status
     from dbbstation.plan.plan import Ball, Circle, Direction
-    from dbbstation.plan.sampling import Sampling
+    from dbbstation.plan.sampling import SampledCircle
     from dbbstation.quality.answer import RunAssessment
     from dbbstation.quality.finding import Finding
     from dbbstation.station.commands import Command
@@ -91,7 +91,7 @@ class RunAnnounced(OfTheRun):
     number: int
     count: int
     instructions: tuple[str, ...]
-    sampling: Sampling | None = None
+    sampling: SampledCircle | None = None
 
 
 @dataclass(frozen=True)

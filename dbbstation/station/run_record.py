@@ -14,7 +14,7 @@ from dbbstation.quality.held import AFTER_HELD, SHORTEST_S, HeldLength
 from dbbstation.station.detector import DWELL_BEHIND_S, feed_out_due_s, live_phi_deg
 from dbbstation.station.events import Sample
 from dbbstation.trace.analysis import CircleFigures, figures
-from dbbstation.trace.cut import cut, unusable_on_turn
+from dbbstation.trace.cut import cut
 from dbbstation.trace.cut import lost_on_turn as shown_lost
 from dbbstation.trace.recording import AFTER_LOSS, Recording, too_many_lost
 
@@ -127,8 +127,7 @@ def circle_figures(
     recording: Recording, circle: Circle, lost: int, lost_on_turn: int, largest_loss_percent: float
 ) -> tuple[CircleFigures | None, str]:
     """Return the figures of a recorded circle, or None and the reason."""
-    shown, kept = shown_lost(recording, circle)
-    unusable = unusable_on_turn(recording, circle)
+    shown, kept, unusable = shown_lost(recording, circle)
     if problem := too_many_lost(max(lost_on_turn, shown), kept, largest_loss_percent, unusable):
         return None, f"{problem}; {AFTER_LOSS}"
     try:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.instrument.reading import DOUBTFUL, OK
-from dbbstation.plan.sampling import sampling
+from dbbstation.plan.sampling import sampled
 from dbbstation.quality.finding import against_limit
 from dbbstation.quality.held import HeldLength
 from dbbstation.station import events
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from dbbstation.errors import StationError
     from dbbstation.instrument.reading import Reading
     from dbbstation.plan.plan import Ball, Circle, Direction, Plan
-    from dbbstation.plan.sampling import Sampling
+    from dbbstation.plan.sampling import SampledCircle
     from dbbstation.quality.finding import Finding
     from dbbstation.station.events import Event, RunId, Sample
     from dbbstation.station.schedule import Schedule
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 
 def instructions(
-    ball: Ball, circle: Circle, *, put_up: bool, program: str, sampling: Sampling | None = None
+    ball: Ball, circle: Circle, *, put_up: bool, program: str, sampling: SampledCircle | None = None
 ) -> tuple[str, ...]:
     """Return the steps in order, with a note if the instrument is too slow."""
     raised = f", raised by {circle.elevation_deg:g}°" if circle.elevation_deg else ", level"
@@ -69,7 +69,7 @@ def instructions(
     )
 
 
-def too_slow(sampling: Sampling) -> str:
+def too_slow(sampling: SampledCircle) -> str:
     """Return the figures that are not resolved by so few points."""
     points = f"The instrument brings {sampling.points_per_turn:.0f} points per turn"
     if not sampling.is_circle:
@@ -248,7 +248,7 @@ class Sequencer:
         program = self._programs.get((run.test, run.direction), "")
         self._commanded = circle = test.run(run.direction)
         self._reachable = Reachable(circle)
-        seen = None if self._rate_hz is None else sampling(circle, self._rate_hz)
+        seen = None if self._rate_hz is None else sampled(circle, self._rate_hz)
         announced = events.RunAnnounced(
             run=run,
             ball=test.ball,

@@ -94,30 +94,21 @@ def cut(recording: Recording, circle: Circle, counted_lost: int = 0) -> RawCircl
         ) from error
 
 
-def lost_on_turn(recording: Recording, circle: Circle) -> tuple[int, int]:
-    """Return numbers of missing and present samples on the turn, or in the whole recording if no turn is found.
+def lost_on_turn(recording: Recording, circle: Circle) -> tuple[int, int, int]:
+    """Return numbers of missing, present and unusable samples on the turn.
 
-    Unusable samples count as missing. Losses outside the turn are harmless.
+    Unusable samples count as missing. Losses outside the turn are harmless. If no turn is found, samples are missing and
+    present in the whole recording, and none is unusable.
     """
     try:
-        t_s = _turn(recording, circle).t_s
+        t_s, found = _turn(recording, circle).t_s, True
     except TraceError:
-        t_s = recording.t_s
-    return max(lost_samples(t_s), _left_out(recording, t_s)), len(t_s)
-
-
-def unusable_on_turn(recording: Recording, circle: Circle) -> int:
-    """Return the number of unusable samples within the turn; 0 without a turn."""
-    try:
-        return _left_out(recording, _turn(recording, circle).t_s)
-    except TraceError:
-        return 0
-
-
-def _left_out(recording: Recording, t_s: Floats) -> int:
-    if recording.usable is None:
-        return 0
-    return int(np.count_nonzero(~recording.usable & (recording.t_s >= t_s[0]) & (recording.t_s <= t_s[-1])))
+        t_s, found = recording.t_s, False
+    unusable = 0
+    if recording.usable is not None:
+        within = (recording.t_s >= t_s[0]) & (recording.t_s <= t_s[-1])
+        unusable = int(np.count_nonzero(~recording.usable & within))
+    return max(lost_samples(t_s), unusable), len(t_s), unusable if found else 0
 
 
 @once_for_each

@@ -205,18 +205,8 @@ class VirtualMachine:
         return planned
 
     def _setup(self, ball: Ball) -> Setup:
-        return Setup(
-            session=_SESSION,
-            mounting=self._mounting_name,
-            ball=ball.name,
-            instrument=_BAR,
-            fixed_ball_mm=np.array(ball.centre_mm),
-            mounting_repeatability_mm=ball.repeatability_mm,
-            ball_uncertainty_mm=ball.uncertainty_mm,
-            bar_uncertainty_mm=self.sizes.bar_uncertainty_mm,
-            place_known=ball.place_known,
-            plate=ball.plate,
-        )
+        u_mm = self.sizes.bar_uncertainty_mm
+        return Setup.on(ball, session=_SESSION, mounting=self._mounting_name, instrument=_BAR, bar_uncertainty_mm=u_mm)
 
     def _of_the_measurement(self, test: PlannedTest, begin_s: float) -> tuple[Fitted, ...]:
         ball, number = test.ball, self.mountings

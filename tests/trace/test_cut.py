@@ -18,7 +18,6 @@ from dbbstation.trace.cut import (
     edges_of,
     lost_on_turn,
     overlap_feed,
-    unusable_on_turn,
 )
 from dbbstation.trace.recording import Recording, means
 
@@ -252,7 +251,8 @@ def test_samples_that_cannot_be_used_move_neither_edges_nor_feed():
         usable[place] = False
     damaged = replace(whole, length_mm=length, usable=usable)
     good, raw = cut(whole, CIRCLE), cut(damaged, CIRCLE)
-    assert lost_on_turn(damaged, CIRCLE)[0] == unusable_on_turn(damaged, CIRCLE) == len(good) - len(raw)
+    lost, _, unusable = lost_on_turn(damaged, CIRCLE)
+    assert lost == unusable == len(good) - len(raw)
     assert np.isin(raw.t_s, good.t_s).all()
     assert raw.phi_deg == pytest.approx(good.phi_deg[np.isin(good.t_s, raw.t_s)], abs=1e-5)
     found = overlap_feed(damaged, CIRCLE, edges_of(damaged, CIRCLE))

@@ -34,7 +34,7 @@ from dbbstation.plan.bar import UNKNOWN_BAR_MM
 from dbbstation.plan.plan import Direction
 from dbbstation.sources.contract import Setup
 from dbbstation.text.written import natural, repeats_in_order
-from dbbstation.trace.cut import cut, lost_on_turn, unusable_on_turn
+from dbbstation.trace.cut import cut, lost_on_turn
 from dbbstation.trace.recording import AFTER_LOSS, too_many_lost
 
 if TYPE_CHECKING:
@@ -106,20 +106,18 @@ class SessionFolder(SessionDetails):
             (0.0, UNKNOWN_BAR_MM) if self.bar is None else self.bar.reads_long_mm(self.bar_temp_c(logged))
         )
         readings = (r for r in self.set_up_errors if mounted_name(self.plan, r.test, r.mounting) == mounted)
-        return Setup(
+        setup = Setup.on(
+            replace(ball, name=f"{self.name}: {ball.name}"),
             session=self.name,
             mounting=f"{self.name}: {mounted}",
-            ball=f"{self.name}: {ball.name}",
             instrument=f"{self.name}: bar" if self.bar is None else self.bar.serial_number or f"{self.name}: bar",
-            fixed_ball_mm=np.array(ball.centre_mm, dtype=np.float64),
-            mounting_repeatability_mm=ball.repeatability_mm,
-            ball_uncertainty_mm=ball.uncertainty_mm,
             bar_uncertainty_mm=uncertainty_mm,
+        )
+        return replace(
+            setup,
             bar_reads_long_mm=long_mm,
             bar_length_mm=None if self.bar is None else self.bar.calibrated_length_mm,
-            place_known=ball.place_known,
             set_up_errors=next((reading.to_domain() for reading in readings), None),
-            plate=ball.plate,
             moving_s=self.moving_s,
         )
 
@@ -166,8 +164,7 @@ class SessionFolder(SessionDetails):
 
     def loss(self, run: RunEntry, recording: Recording) -> list[Problem]:
         """Return a note if more samples were lost than the plan allows."""
-        lost, kept = lost_on_turn(recording, self.circle(run))
-        unusable = unusable_on_turn(recording, self.circle(run))
+        lost, kept, unusable = lost_on_turn(recording, self.circle(run))
         what = too_many_lost(lost, kept, self.plan.largest_loss_percent, unusable)
         return [Problem.of(run.path, what, AFTER_LOSS)] if what else []
 

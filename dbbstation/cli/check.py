@@ -226,7 +226,7 @@ def _dry_run(
 ) -> DryRunResult:
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
-    from dbbstation.nc.export import dry_run
+    from dbbstation.nc.circle_programs import dry_run
     from dbbstation.plan.plan import chosen_of
     from dbbstation.results.checked import DryRunResult
 

@@ -14,13 +14,12 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import StationError
 from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.facts.value import finite
-from dbbstation.machine.geometry import check_joints, check_model_is_of
+from dbbstation.machine.geometry import check_joints
 from dbbstation.model.identified import position_uncertainty_mm
-from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import Compensation, Prefer, compensated_parts
-from dbbstation.nc.curve import felt_mm, rounding_mm
+from dbbstation.nc.curve import felt_mm
 from dbbstation.nc.dialect import COMPENSATED
-from dbbstation.nc.limits import CHORD_MM, CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
+from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.nc.mark import ProgramChecksum, check_machine, check_nominal, has_marks, marked, sums_of
 from dbbstation.nc.planner import Planner
 from dbbstation.nc.reach import STEP_DEG as REACH_DEG
@@ -29,20 +28,17 @@ from dbbstation.nc.reach import check_feeds, check_reach
 from dbbstation.nc.setup import offset_text
 from dbbstation.nc.spilled import LongText, Spilled
 from dbbstation.nc.toolpath import in_pieces
-from dbbstation.plan.plan import chosen_of
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
     from dbbstation.computing.arrays import Integers
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.model.machine_model import MachineModel
-    from dbbstation.nc.circle_program import Approach
     from dbbstation.nc.dialect import Dialect
     from dbbstation.nc.toolpath import Toolpath
-    from dbbstation.plan.plan import Circle, Plan
 
     _Uncertainty = tuple[float | None, Mapping[str, float | None] | None, str | None]
 
@@ -103,75 +99,6 @@ class Program:
         return str(self.content)
 
 
-def circle_programs(
-    plan: Plan,
-    machine: Machine,
-    dialect: Dialect,
-    *,
-    inverse: Inverse | None = None,
-    origin: Mapping[str, str] | None = None,
-    tests: Sequence[str] = (),
-    step_deg: float = STEP_DEG,
-    chord_mm: float = CIRCLE_CHORD_MM,
-    approach: Approach | None = USUAL_APPROACH,
-    progress: Callable[[int, int], None] = lambda _done, _of: None,
-) -> list[Program]:
-    """Return the programs of all runs, named TEST-DIRECTION with the dialect's extension.
-
-    Args:
-        inverse: None for nominal programs.
-        step_deg: angle between points; compensated programs use a larger one if the feed needs it.
-        chord_mm: greatest distance of a compensated move from the circle.
-
-    Raises:
-        TravelError: a program leaves the travel; none is returned then.
-        ModelError: the model is of another nominal machine, or has a source that needs data that a program lacks.
-        StationError: a test that the plan does not have, or a circle that `strict` refuses.
-    """
-    if inverse is not None:
-        check_model_is_of(machine, inverse.model.machine)
-    runs = plan.runs(chosen_of(plan.name, plan.tests, tests, ()))
-    programs: list[Program] = []
-    for number, ((name, direction), circle) in enumerate(runs.items(), 1):
-        progress(len(programs), len(runs))
-        title = f"test {name} {direction}"
-
-        step = step_deg
-        if inverse is not None and inverse.prefer is Prefer.ACCURACY:
-            step = _step_deg(circle, step_deg, chord_mm, planner_of(machine, dialect))
-        path = replace(circle_toolpath(circle, title, step_deg=step, approach=approach), run=number)
-        rounding_um = 1e3 * rounding_mm(dialect.decimals)
-        header = _circle_header(title, circle, step, {"plan": plan.name, "machine": machine.name}, rounding_um)
-        header += _said(origin or {})
-        programs.append(_program(path, machine, dialect, f"{name}-{direction}", inverse, chord_mm, header, split=False))
-    progress(len(programs), len(runs))
-    return programs
-
-
-def dry_run(
-    plan: Plan,
-    machine: Machine,
-    *,
-    tests: Sequence[str] = (),
-    step_deg: float = STEP_DEG,
-    approach: Approach | None = USUAL_APPROACH,
-    progress: Callable[[int, int], None] = lambda _done, _of: None,
-) -> tuple[int, list[StationError]]:
-    """Check the nominal programs of all runs of a plan without writing them."""
-    runs = plan.runs(tests)
-    faults: list[StationError] = []
-    for done, ((name, direction), circle) in enumerate(runs.items()):
-        progress(done, len(runs))
-        path = circle_toolpath(circle, f"test {name} {direction}", step_deg=step_deg, approach=approach)
-        for check in (check_reach, check_feeds):
-            try:
-                check(machine, path)
-            except StationError as error:
-                faults.append(error)
-    progress(len(runs), len(runs))
-    return len(runs), faults
-
-
 def compensated_program(
     path: Toolpath,
     dialect: Dialect,
@@ -193,13 +120,13 @@ def compensated_program(
     machine = inverse.model.machine
     check_nominal(path)
     check_machine(path, machine)
-    header = [f"machine: {machine.name}", *_said(origin or {}), *_holds_for(path)]
+    header = [f"machine: {machine.name}", *named(origin or {}), *_holds_for(path)]
 
-    return _program(path, machine, dialect, path.name, inverse, chord_mm, header, split=True)
+    return written_program(path, machine, dialect, path.name, inverse, chord_mm, header, split=True)
 
 
 @with_one_thread
-def _program(
+def written_program(
     path: Toolpath,
     machine: Machine,
     dialect: Dialect,
@@ -210,6 +137,12 @@ def _program(
     *,
     split: bool,
 ) -> Program:
+    """Return the program of a path, compensated if there is an inverse.
+
+    Args:
+        stem: of its name.
+        split: split moves; otherwise arcs keep their chords.
+    """
     name, own = dialect.file_name(stem, path.run), machine.hexapod.rotation
     path = replace(path, rotation=path.rotation or own)
     check_reach(machine, path)
@@ -238,7 +171,7 @@ def _program(
 
     def head() -> tuple[list[str], tuple[int, ...]]:
         total = done.total
-        said = [*header, *_said(inverse.origin), f"{COMPENSATED} {total.greatest_um:.3f} um"]
+        said = [*header, *named(inverse.origin), f"{COMPENSATED} {total.greatest_um:.3f} um"]
         said.append(f"chord error asked for {asked_um:g} um, reached {total.chord_um:.3f} um")
         said += remarks_on(total, asked_um, machine, dialect, prefer)
         said += [] if done.is_marked else ["its poses are too few to carry a mark: keep this header"]
@@ -315,14 +248,6 @@ def planner_of(machine: Machine, dialect: Dialect) -> Planner:
     return Planner(machine.planned_acceleration_mm_s2, dialect.look_ahead)
 
 
-def _step_deg(circle: Circle, step_deg: float, chord_mm: float, planner: Planner) -> float:
-    """Return the angle between points of a compensated circle [deg]: at least `step_deg`, or more if the feed needs it, within the chord error."""
-    # The arc is divided evenly: its steps may be smaller by a part in its number of points.
-    needed_mm = 1.01 * float(planner.needed_mm(np.array(circle.feed_mm_min / 60.0)))
-    longest_mm = float(np.sqrt(8.0 * circle.radius_mm * chord_mm)) / 1.01
-    return max(step_deg, float(np.degrees(min(needed_mm, longest_mm) / circle.radius_mm)))
-
-
 UNCERTAIN_AT = 2000
 """Number of poses along the path at which the model's uncertainty is computed: it changes over decimetres."""
 
@@ -367,21 +292,8 @@ def _said_of_uncertainty(
     return [f"standard uncertainty of the model along the path at most: {', '.join(each)}", f"not known because {why}"]
 
 
-def _circle_header(
-    name: str, circle: Circle, step_deg: float, names: Mapping[str, str], rounding_um: float
-) -> list[str]:
-    chord_um = 1e3 * chord_error_mm(circle, step_deg)
-    return [
-        f"ball-bar run: {name}",
-        *_said(names),
-        f"bar {circle.bar_mm:g} mm, circle of radius {circle.radius_mm:.6f} mm about "
-        + " ".join(f"{axis}{value:.6f}" for axis, value in zip("XYZ", circle.centre_mm, strict=True)),
-        f"a point every {step_deg:g} deg: chord error {chord_um:.3f} um, rounding at most {rounding_um:.2g} um",
-        "coordinates are the machine's: work offsets and tool length must be zero",
-    ]
-
-
-def _said(names: Mapping[str, str]) -> list[str]:
+def named(names: Mapping[str, str]) -> list[str]:
+    """Return lines of a header that name something."""
     return [f"{what}: {name}" for what, name in names.items()]
 
 

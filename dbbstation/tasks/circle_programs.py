@@ -85,7 +85,7 @@ def program(
     from dbbstation.files.provenance import from_python
     from dbbstation.machine.geometry import refuse_second_correction
     from dbbstation.nc.circle_program import Approach
-    from dbbstation.nc.export import circle_programs
+    from dbbstation.nc.circle_programs import circle_programs
     from dbbstation.plan.plan import chosen_of
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.programs import programs_result

@@ -10,8 +10,9 @@ import pytest
 from dbbstation.errors import InputError, StationError
 from dbbstation.model.observation import Observation
 from dbbstation.nc.circle_program import chord_error_mm, circle_toolpath
+from dbbstation.nc.circle_programs import circle_programs
 from dbbstation.nc.commanded import commanded_poses, poses_at_progress
-from dbbstation.nc.export import Inverse, circle_programs
+from dbbstation.nc.export import Inverse
 from dbbstation.plan.plan import Circle
 from dbbstation.sources.contract import Motion, Setup
 from dbbstation.trace.recording import RawCircle

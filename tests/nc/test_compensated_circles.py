@@ -9,8 +9,9 @@ import pytest
 
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import arc_phi_deg, chord_error_mm, circle_toolpath
+from dbbstation.nc.circle_programs import circle_programs
 from dbbstation.nc.compensate import Prefer
-from dbbstation.nc.export import Inverse, circle_programs
+from dbbstation.nc.export import Inverse
 from dbbstation.nc.toolpath import RowKind, Toolpath, in_pieces
 from dbbstation.plan.plan import Circle, Direction
 from dbbstation.sources.contract import Motion

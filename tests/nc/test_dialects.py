@@ -18,9 +18,10 @@ from dbbstation.files.own_dialects import dialect_given
 from dbbstation.machine.geometry import Rotation
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import circle_toolpath
+from dbbstation.nc.circle_programs import circle_programs
 from dbbstation.nc.dialect import Dialect
 from dbbstation.nc.dialects.linuxcnc import LinuxCNC
-from dbbstation.nc.export import Inverse, circle_programs, compensated_program
+from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.registry import GROUP, dialect_named, dialect_of_file, known_dialects
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import RowKind, ToolpathBuilder
@@ -31,7 +32,8 @@ ONE_FILE = '''
 """A dialect for a test."""
 
 from dbbstation.nc.dialect import Dialect
-from dbbstation.nc.export import Inverse, circle_programs, compensated_program
+from dbbstation.nc.circle_programs import circle_programs
+from dbbstation.nc.export import Inverse, compensated_program
 
 
 class Shouting(Dialect):

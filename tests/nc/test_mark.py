@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import StationError
+from dbbstation.nc.circle_programs import circle_programs
 from dbbstation.nc.dialects.linuxcnc import LinuxCNC
-from dbbstation.nc.export import Inverse, circle_programs, compensated_program
+from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.mark import BITS, BY_CHANCE, _marks, _sums, is_marked, marked
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import DECIMALS, in_last_decimals

@@ -15,7 +15,8 @@ from dbbstation.errors import InputError, MachineError, StationError
 from dbbstation.machine.geometry import GREATEST_FEED_MM_MIN
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import circle_toolpath
-from dbbstation.nc.export import Inverse, circle_programs, compensated_program
+from dbbstation.nc.circle_programs import circle_programs
+from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.reach import check_reach
 from dbbstation.nc.rs274.blocks import LONGEST_BYTES
 from dbbstation.nc.rs274.moves import MOST_ROWS

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.nc.circle_programs import circle_programs
 from dbbstation.nc.compensate import Prefer
-from dbbstation.nc.export import KEPT, Inverse, circle_programs, compensated_program, planner_of
+from dbbstation.nc.export import KEPT, Inverse, compensated_program, planner_of
 from dbbstation.nc.planner import cuts
 from dbbstation.plan.plan import Plan
 from dbbstation.virtual.linuxcnc import PERIOD_NS, BehindError, PlannerRun, missing, run, run_once

@@ -12,10 +12,11 @@ import pytest
 from dbbstation.errors import StationError
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.nc.circle_programs import circle_programs
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.curve import felt_mm
 from dbbstation.nc.dialects.linuxcnc import LinuxCNC
-from dbbstation.nc.export import Inverse, circle_programs, compensated_program, planner_of
+from dbbstation.nc.export import Inverse, compensated_program, planner_of
 from dbbstation.nc.planner import LookAhead, Planner
 from dbbstation.nc.splitting import longest
 from dbbstation.nc.toolpath import RowKind

@@ -10,8 +10,9 @@ import pytest
 
 from dbbstation.errors import InputError
 from dbbstation.nc.circle_program import circle_toolpath
+from dbbstation.nc.circle_programs import circle_programs
 from dbbstation.nc.dialects.linuxcnc import guard_lines
-from dbbstation.nc.export import Inverse, circle_programs, compensated_program
+from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.setup import ZERO, ControlSetup
 from dbbstation.nc.toolpath import IN_FORCE, PIECE_CORNER_MM, Ending

@@ -10,7 +10,8 @@ from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.recordings.session import read_session
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.nc.export import Inverse, circle_programs
+from dbbstation.nc.circle_programs import circle_programs
+from dbbstation.nc.export import Inverse
 from dbbstation.nc.registry import dialect_named
 from dbbstation.plan.plan import Direction
 from dbbstation.station.programs import load_programs, read_toolpath

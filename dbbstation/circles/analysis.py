@@ -15,7 +15,7 @@ from dbbstation.computing.arrays import place_of_largest, range_of
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.trace.analysis import figures, passes_of
-from dbbstation.trace.cut import edges_of, overlap_feed_under
+from dbbstation.trace.cut import edges_of, overlap_feed
 from dbbstation.trace.recording import lost_samples
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def feed_shown(recording: Recording, circle: Circle, noise_mm: float = 0.0) -> t
     """
     if recording.theta_deg is not None:
         return None
-    return overlap_feed_under(recording, circle, edges_of(recording, circle), noise_mm)
+    return overlap_feed(recording, circle, edges_of(recording, circle), noise_mm)
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,7 +68,7 @@ class HolderResult:
     of_cmm_um: float
 
 
-def repeatability(places_um: Sequence[Floats], cmm_um: float = 0.0, level: float = LEVEL) -> HolderResult:
+def repeatability(places_um: Sequence[Floats], cmm_um: float = 0.0) -> HolderResult:
     """Return a holder's repeatability.
 
     Args:
@@ -84,15 +84,15 @@ def repeatability(places_um: Sequence[Floats], cmm_um: float = 0.0, level: float
     off = [place - place.mean(axis=0) for place in several]
     squares = np.sum([np.sum(one**2, axis=0) for one in off], axis=0)
     freedom = sum(len(one) - 1 for one in off)
-    axes = [scatter(float(total), freedom, cmm_um, level) for total in squares]
-    together = scatter(float(squares.sum()), freedom * len(squares), cmm_um, level)
+    axes = [scatter(float(total), freedom, cmm_um) for total in squares]
+    together = scatter(float(squares.sum()), freedom * len(squares), cmm_um)
     # Distances from an estimated mean are too small by sqrt((n - 1) / n).
     distances = np.concatenate([np.linalg.norm(one, axis=1) * math.sqrt(len(one) / (len(one) - 1)) for one in off])
     return HolderResult(
         repeatability_um=together.s_um,
         together=together,
         axes=dict(zip("xyz", axes, strict=False)),
-        level=level,
+        level=LEVEL,
         rms_distance_um=math.sqrt(float(squares.sum()) / freedom),
         mean_distance_um=float(distances.mean()),
         places=len(several),
@@ -102,9 +102,9 @@ def repeatability(places_um: Sequence[Floats], cmm_um: float = 0.0, level: float
     )
 
 
-def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float = LEVEL) -> HolderScatter:
+def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0) -> HolderScatter:
     """Return the standard deviation from a sum of squares, with its chi-square interval."""
-    tail = (1.0 - level) / 2.0
+    tail = (1.0 - LEVEL) / 2.0
     variances = (
         squares_um2 / freedom,
         squares_um2 / float(chdtri(freedom, tail)),

@@ -238,21 +238,15 @@ def feed_off(found: tuple[float, float], recording: Recording, circle: Circle, e
     return min(abs(found[0] - share * circle.feed_mm_min) for share in (1.0, larger)) / limit
 
 
-def overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> tuple[float, float] | None:
-    """Return the feed that matches both passes of the overlap, with standard deviation [mm/min], cached; None if undetermined.
+def overlap_feed(
+    recording: Recording, circle: Circle, edges: tuple[float, float], noise_mm: float = 0.0
+) -> tuple[float, float] | None:
+    """Return the overlap's feed and standard uncertainty [mm/min]; None if undetermined.
 
     The search starts at the programmed feed and at the feed computed from the duration.
-    """
-    found = _found_feed(recording, circle, edges)
-    return None if found is None else (found[0], found[1])
 
-
-def overlap_feed_under(
-    recording: Recording, circle: Circle, edges: tuple[float, float], noise_mm: float
-) -> tuple[float, float] | None:
-    """Return the overlap's feed and standard uncertainty [mm/min] under known noise; None if undetermined.
-
-    The scatter of pieces understates correlated noise, so the turn's noise replaces it if larger.
+    Args:
+        noise_mm: of the turn; it replaces the scatter of pieces if larger, which understates correlated noise.
     """
     found = _found_feed(recording, circle, edges)
     if found is None:

@@ -26,7 +26,7 @@ from tests.plant.mechanisms.base import Mechanism
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.outsiders import DentedScrew, OddGearWobble, SoftFloor
 from tests.plant.plan import ALL, EIGHT, subset, table_ii_plan
-from tests.plant.session import record
+from tests.plant.session import MEANS_OF_TWO_HZ, record
 
 pytestmark = pytest.mark.slow
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
@@ -64,7 +64,7 @@ def wobble_um(mechanism, length_mm):
 
 def diagnosed(folder, seed, mechanism, tests=EIGHT):
     plan = subset(table_ii_plan(seed), tests)
-    truth = record(folder, seed=seed, plan=plan, mechanisms=[KINEMATICS, mechanism], rate_hz=10.0)
+    truth = record(folder, seed=seed, plan=plan, mechanisms=[KINEMATICS, mechanism], rate_hz=MEANS_OF_TWO_HZ)
     recorded = load_sessions([folder])
     sources = sources_named(["backlash", "bar-drift"])
     return truth, diagnose(recorded.machine, recorded.observations, sources)
@@ -226,7 +226,7 @@ def test_the_summary_has_the_curve(hollow):
 
 def on_a_soft_floor(folder, seed, lean_urad_mm):
     """Diagnosis of a table that tips over a little; an elastic base is the nearest cause with a name."""
-    record(folder, seed=seed, mechanisms=[KINEMATICS, SoftFloor(lean_urad_mm)], rate_hz=10.0)
+    record(folder, seed=seed, mechanisms=[KINEMATICS, SoftFloor(lean_urad_mm)], rate_hz=MEANS_OF_TWO_HZ)
     recorded = load_sessions([folder])
     names = ["gravity", "cog-shift", "base-compliance", "strut-weight", "bar-drift", "jig-thermal", "platform-joints"]
     return diagnose(recorded.machine, recorded.observations, sources_named(names))

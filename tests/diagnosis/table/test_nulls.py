@@ -20,7 +20,12 @@ def test_noise_has_no_name(kind, tables):
     """At one false name in twenty tables two of two have one once in four hundred times, two of four once in seventy."""
     if kind == "low-passed" and tables > 2:
         pytest.skip("averaged noise takes ten times as long as others")
-    assert sum(bool(identified_in(kind, 5000 + k)) for k in range(tables)) < 2
+    named = 0
+    for left in reversed(range(tables)):
+        named += bool(identified_in(kind, 5000 + left))
+        if named + left < 2:  # whatever the others are
+            break
+    assert named < 2
 
 
 @pytest.mark.slow

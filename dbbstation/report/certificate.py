@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.event_log import CLOCK_S, impossible_day, sealed_at
+from dbbstation.results.report import CertificateState
 from dbbstation.text.written import listed
 
 if TYPE_CHECKING:
@@ -20,29 +20,15 @@ MOST_NAMED = 3
 """Greatest number of missing facts in the title; the first page names all."""
 
 
-@dataclass(frozen=True)
-class Certified:
-    """Whether a report is a certificate, and the missing facts."""
-
-    lacking: tuple[str, ...]
-    place: str
-
-    @property
-    def title(self) -> str:
-        """Return `Certificate of circular tests`, or `Not a certificate` with the missing facts."""
-        if not self.lacking:
-            return "Certificate of circular tests"
-        return f"Not a certificate: {listed(self.lacking, MOST_NAMED)}"
-
-
-def certified(sessions: Sequence[SessionFolder], job: str, place: str, *, tolerances: bool) -> Certified:
+def certified(sessions: Sequence[SessionFolder], job: str, place: str, *, tolerances: bool) -> CertificateState:
     """Return whether a report is a certificate, and the missing facts."""
     lacking = dict.fromkeys(text for session in sessions for text in _lacking(session, job))
     if not place.strip():
         lacking["place unknown"] = None
     if not tolerances:
         lacking["no tolerance"] = None
-    return Certified(tuple(lacking), place)
+    named = f"Not a certificate: {listed(tuple(lacking), MOST_NAMED)}"
+    return CertificateState(named if lacking else "Certificate of circular tests", tuple(lacking), place or None)
 
 
 def _lacking(session: SessionFolder, job: str) -> list[str]:

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from dbbstation.files.provenance import Provenance
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.plan import PlannedTest
-    from dbbstation.report.certificate import Certified
     from dbbstation.results.calibration import EvaluationResult
     from dbbstation.results.circles import Circled, CirclesResult
     from dbbstation.results.report_verdict import Ranked
@@ -124,7 +123,6 @@ def numbers_of(reported: Reported, page: str) -> ReportResult:
     now_both = (*now, *tolerated_pairs(reported.found.pairs, tolerances))
     modelled, ranked = reported.modelled, reported.ranked
     identified = None if modelled is None else modelled.identified
-    certificate = certified_of(reported)
     former = reported.before
     before = () if former is None else tolerated_circles(former.shown, tolerances)
     before_both = (*before, *(() if former is None else tolerated_pairs(former.pairs, tolerances)))
@@ -135,7 +133,7 @@ def numbers_of(reported: Reported, page: str) -> ReportResult:
         verdict=verdict_of(
             held, reported.found, coverage_factor, identified, ranked, None if modelled is None else modelled.evaluation
         ),
-        certificate=CertificateState(certificate.title, certificate.lacking, certificate.place or None),
+        certificate=certified_of(reported),
         model_warnings=() if identified is None else model_warnings(identified),
         coverage_factor=coverage_factor,
         tolerances=held,
@@ -153,7 +151,7 @@ def numbers_of(reported: Reported, page: str) -> ReportResult:
     )
 
 
-def certified_of(reported: Reported) -> Certified:
+def certified_of(reported: Reported) -> CertificateState:
     """Return what a report needs to be a certificate."""
     found = reported.found
     shown = [session for session in found.sessions if any(c.session == session.name for c in found.circles)]

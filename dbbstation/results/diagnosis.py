@@ -15,14 +15,13 @@ from dbbstation.facts import OfRun, of_facts
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import Cancelling
 from dbbstation.inference.levels import Acts, Levels, LimitReached, Verdict
-from dbbstation.model.identified import IdentifiedModel
 from dbbstation.results.calibration import WithModel
 from dbbstation.results.frame import ByName, Framed
 from dbbstation.results.levels_text import bars, level_sentences, short_sentences
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from dbbstation.diagnosis.findings import Diagnosis
 
@@ -153,18 +152,6 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
         next_test=diagnosis.next_tests[0] if diagnosis.next_tests else None,
         further_tests=diagnosis.next_tests[1:],
     )
-
-
-def diagnosis_result(
-    figures: DiagnosisFigures,
-    *,
-    effects: tuple[CauseEffect, ...],
-    model: IdentifiedModel,
-    drawing: Callable[[object], bytes],
-    notes: tuple[str, ...],
-) -> DiagnosisResult:
-    """Return the whole result of a diagnosis."""
-    return of_facts(DiagnosisResult, figures, drawing=drawing, notes=notes, effects=effects, model=model)
 
 
 def kept_of(figures: DiagnosisFigures) -> dict[str, object]:

@@ -116,11 +116,10 @@ def _sized(budget: Budget) -> Size:
 def sizes_of(one: CircleAnalysis, known: SetUpKnowledge) -> dict[CircleFigure, Size]:
     """Return sizes with uncertainties."""
     found = budgets(one, known, (BudgetQuantity.G_LS, BudgetQuantity.MEAN_RADIAL, BudgetQuantity.X, BudgetQuantity.Y))
-    g, radial = found[BudgetQuantity.G_LS], found[BudgetQuantity.MEAN_RADIAL]
     return {
-        CircleFigure.CIRCULAR_DEVIATION: Size(g.value_um, g.u_um, g.why_not, g.known_um),
+        CircleFigure.CIRCULAR_DEVIATION: _sized(found[BudgetQuantity.G_LS]),
         CircleFigure.CENTRE_DEVIATION: _off_centre(found[BudgetQuantity.X], found[BudgetQuantity.Y]),
-        CircleFigure.MEAN_RADIAL_ERROR: Size(abs(radial.value_um), radial.u_um, radial.why_not, radial.known_um),
+        CircleFigure.MEAN_RADIAL_ERROR: _sized(found[BudgetQuantity.MEAN_RADIAL]),
     }
 
 

@@ -114,14 +114,14 @@ _OF_OTHERS = {SessionTask.ACCEPTANCE, SessionTask.HISTORY}
 
 KINEMATIC, JOINT = "model.yaml", "joint-model.yaml"
 
-_OUT = {
-    SessionTask.CALIBRATE: ("out", KINEMATIC),
-    SessionTask.DIAGNOSE: ("out", JOINT),
-    SessionTask.PROGRAMS: ("", "programs"),
-    SessionTask.REPORT: ("", "report.html"),
-    SessionTask.ACCEPTANCE: ("", "acceptance.html"),
-    SessionTask.FIGURES: ("figure", "circles.pdf"),
-    SessionTask.HISTORY: ("page", "history.html"),
+_CALLED = {
+    SessionTask.CALIBRATE: ("calibrate", "out", KINEMATIC),
+    SessionTask.DIAGNOSE: ("diagnose", "out", JOINT),
+    SessionTask.PROGRAMS: ("program", "", "programs"),
+    SessionTask.REPORT: ("report", "", "report.html"),
+    SessionTask.ACCEPTANCE: ("report", "", "acceptance.html"),
+    SessionTask.FIGURES: ("circles", "figure", "circles.pdf"),
+    SessionTask.HISTORY: ("history", "page", "history.html"),
 }
 """Output of a step that is no parameter of its task, and the name of its result in the folder of results."""
 
@@ -251,7 +251,7 @@ class After:
         if progress is WorkProgress.RUNNING:
             return
         if progress is WorkProgress.DONE:
-            result.answer, result.path = work.answer(), self.folder / _OUT[step][1]
+            result.answer, result.path = work.answer(), self.folder / _CALLED[step][2]
             with suppress(InputError, OSError):
                 now = counted(self.session)
                 keep_steps(self.folder, now, self._done())
@@ -281,19 +281,18 @@ class After:
         self._running = step, self._start(self._call(step), self.folder)
 
     def _call(self, step: SessionTask) -> Call:
-        sessions = {"sessions": str(self.session)}
-        match step:
-            case SessionTask.CALIBRATE | SessionTask.DIAGNOSE:
-                task, given = step.value, sessions
-            case SessionTask.PROGRAMS:
-                plan, machine = self._files()
-                task, given = "program", {"plan": str(plan), "machine": str(machine), "out": _OUT[step][1]}
-            case SessionTask.REPORT | SessionTask.ACCEPTANCE:
-                task, given = "report", sessions | {"page": _OUT[step][1]}
-            case SessionTask.FIGURES:
-                task, given = "circles", sessions | {"filter": str(TOLERATED.value)}
-            case SessionTask.HISTORY:
-                task, given = "history", {"folder": str(self.session.parent)}
+        (task, output, file), given = _CALLED[step], {"sessions": str(self.session)}
+        match task:
+            case "program":
+                session = read_session(self.session)
+                plan, machine = session.plan_path.absolute(), session.machine_path.absolute()
+                given = {"plan": str(plan), "machine": str(machine), "out": file}
+            case "report":
+                given |= {"page": file}
+            case "circles":
+                given |= {"filter": str(TOLERATED.value)}
+            case "history":
+                given = {"folder": str(self.session.parent)}
         if step is SessionTask.ACCEPTANCE:
             if self.former is None:
                 raise ValueError("no session was chosen for the comparison")
@@ -302,7 +301,6 @@ class After:
             given |= {"model": str(self.model)}
         if step is SessionTask.REPORT and self._place:
             given |= {"place": self._place}
-        output, file = _OUT[step]
         return Call(
             task=task,
             given=given,
@@ -311,10 +309,6 @@ class After:
             settings=None if self._settings is None else self._settings.absolute(),
             tolerances=self._tolerances if step is SessionTask.REPORT else None,
         )
-
-    def _files(self) -> tuple[Path, Path]:
-        session = read_session(self.session)
-        return session.plan_path.absolute(), session.machine_path.absolute()
 
     def _done(self) -> dict[str, DoneStep]:
         return {

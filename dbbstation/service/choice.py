@@ -211,7 +211,7 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
     if not (choice.goes_on or choice.line.virtual or details.bar_waiver):
         check_bar_known(bar, domain, datetime.now(UTC), limits.largest_bar_age_h)
     recorded = _recorded(choice.folder, job.instrument) if choice.goes_on else ()
-    left = Schedule(domain, lambda _test, _direction: 1, recorded).open
+    left = Schedule(domain, recorded=recorded).open
     circles = [domain.tests[task.test].run(task.direction) for task in left]
     names = (*domain.tests, *domain.repeat_at_end)
     return Prepared(

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from pathlib import Path
 
-    from dbbstation.files.recordings.session import SessionFolder
-
 
 @dataclass(frozen=True)
 class SessionLine:
@@ -60,7 +58,7 @@ def _line(folder: Path, changed: datetime) -> SessionLine:
         session = read_session(folder)
     except InputError as error:
         return SessionLine(folder, changed, problem=error.problems[0].what)
-    schedule = schedule_of(session)
+    schedule = Schedule(session.plan, recorded=session.runs)
     circles = [session.plan.tests[task.test].run(task.direction) for task in schedule.open]
     return SessionLine(
         folder=folder,
@@ -73,11 +71,6 @@ def _line(folder: Path, changed: datetime) -> SessionLine:
         left_s=circles_s(circles),
         virtual=session.virtual is True,
     )
-
-
-def schedule_of(session: SessionFolder) -> Schedule:
-    """Return finished and remaining runs of a session, without writing."""
-    return Schedule(session.plan, lambda _test, _direction: 1, session.runs)
 
 
 class CandidateFormat(StrEnum):

@@ -85,7 +85,8 @@ def diagnose(
     from dbbstation.calibration.reporting.figures import calibration_figures, identified_model, report_of
     from dbbstation.diagnosis import diagnose as search
     from dbbstation.diagnosis.effects import effects_of
-    from dbbstation.results.diagnosis import diagnosis_figures, diagnosis_result, kept_of
+    from dbbstation.facts import of_facts
+    from dbbstation.results.diagnosis import DiagnosisResult, diagnosis_figures, kept_of
     from dbbstation.tasks.diagnosed import diagnosed_of
     from dbbstation.tasks.models import sources_known
 
@@ -107,14 +108,15 @@ def diagnose(
     covariance = fit.solution.covariance + np.diag(of_formulas)
     effects = effects_of(fit.model, fit.observations, names, covariance, fit.null_space, of_formulas)
     verdicts = {one.name: str(one.verdict) for one in figures.sources}
-    result = diagnosis_result(
+    return of_facts(
+        DiagnosisResult,
         figures,
         effects=tuple(replace(one, verdict=verdicts.get(one.cause, "")) for one in effects),
         model=model,
         drawing=partial(_drawn, found),
         notes=tuple(telling.notes),
+        recorded=diagnosed.recorded,
     )
-    return replace(result, recorded=diagnosed.recorded)
 
 
 def _unnamed(found: Diagnosis) -> JointFitWithCurve | None:

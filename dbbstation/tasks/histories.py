@@ -139,7 +139,7 @@ class _Reading:
         self,
         files: Mapping[str, Path],
         kind: type[_Kind],
-        work: Callable[[Path], _Kind | _Unreadable],
+        work: Callable[[Path], _Kind],
         others: Callable[[Path], Sequence[Path]],
         processes: Callable[[Sequence[Path]], int] = lambda _paths: 1,
     ) -> dict[str, _Kind]:
@@ -165,7 +165,7 @@ class _Reading:
                 reasons[name] = reason_of(error)
             self._count()
         digests, paths = list(unknown), [same[0].path for same in unknown.values()]
-        with closing(each(work, paths, processes(paths))) as outcomes:
+        with closing(each(partial(_tried, work), paths, processes(paths))) as outcomes:
             for place, outcome in outcomes:
                 digest = digests[place]
                 self.worked_out += 1
@@ -215,26 +215,26 @@ def _processes_for(sessions: Sequence[Path]) -> int:
     return min(os.cpu_count() or 1, len(sessions)) if runs >= RUNS_WORTH_PROCESSES else 1
 
 
-def _session_data(path: Path) -> SessionFigures | _Unreadable:
+def _session_data(path: Path) -> SessionFigures:
     from dbbstation.tasks.session_figures import session_figures
 
-    try:
-        return session_figures(path.parent)
-    except (StationError, OSError) as error:
-        return _Unreadable(_why(error))
+    return session_figures(path.parent)
 
 
-def _model_data(path: Path, source_files: Sequence[Path]) -> ModelFigures | _Unreadable:
+def _model_data(path: Path, source_files: Sequence[Path]) -> ModelFigures:
     from dbbstation.tasks.session_figures import model_figures
 
+    return model_figures(path, source_files)
+
+
+def _tried(work: Callable[[Path], _Kind], path: Path) -> _Kind | _Unreadable:
     try:
-        return model_figures(path, source_files)
-    except (StationError, OSError) as error:
-        return _Unreadable(_why(error))
-
-
-def _why(error: StationError | OSError) -> str:
-    return reason_of(error) if isinstance(error, OSError) else _first_of(error)
+        return work(path)
+    except OSError as error:
+        return _Unreadable(reason_of(error))
+    except StationError as error:
+        lines = str(error).splitlines()
+        return _Unreadable(lines[0] + (f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""))
 
 
 def _called(name: str) -> str:
@@ -246,11 +246,6 @@ def _understood(kind: type[_Kind], text: str | None) -> _Kind | None:
         return None if text is None else read_json(kind, text)
     except ValueError:
         return None
-
-
-def _first_of(error: StationError) -> str:
-    lines = str(error).splitlines()
-    return lines[0] + (f" (and {len(lines) - 1} more)" if len(lines) > 1 else "")
 
 
 MOST_NAMED = 3

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from dbbstation.system.handles import open_to_read
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
     from io import FileIO
     from pathlib import Path
 
@@ -104,13 +104,18 @@ def sha256_hex(data: bytes | str) -> str:
     return hashlib.sha256(data.encode() if isinstance(data, str) else data).hexdigest()
 
 
+def sha256_of_blocks(blocks: Iterable[bytes]) -> str:
+    """Return the SHA-256 of a text that comes in blocks."""
+    digest = hashlib.sha256()
+    for block in blocks:
+        digest.update(block)
+    return digest.hexdigest()
+
+
 def digest_of(path: Path) -> str:
     """Return a file's SHA-256 in hexadecimal, read in blocks."""
-    digest = hashlib.sha256()
     with opened(path) as source:
-        for block in source.blocks():
-            digest.update(block)
-    return digest.hexdigest()
+        return sha256_of_blocks(source.blocks())
 
 
 def _stat(path: Path) -> os.stat_result:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from dbbstation.computing.arrays import place_of_largest
-from dbbstation.quality.finding import Finding, FindingVerdict, Name, undecided
+from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.forms import Forms, form_of
 from dbbstation.quality.limits import length_quantile
 from dbbstation.quality.together import expected_um, read_um
@@ -121,14 +121,7 @@ def programs_of_all(runs: Sequence[Seen], forms: AllForms | None = None) -> Find
     limit = -float(np.log(PROBABILITY))
     stated = f"all {len(pairs)} runs together"
     if value <= 0.0:
-        return Finding(
-            Name.PROGRAMS,
-            0.0,
-            limit,
-            "",
-            FindingVerdict.GOOD,
-            f"{stated} are likelier as planned than mirrored or turned",
-        )
+        return found(Name.PROGRAMS, 0.0, limit, f"{stated} are likelier as planned than mirrored or turned", "")
     if value <= limit:
         why = f"{stated} are {np.exp(value):.0f} times as likely if programs ran otherwise, best {way.label}: too little to tell"
         return Finding(Name.PROGRAMS, value, limit, "", FindingVerdict.CANNOT_TELL, why)

@@ -41,11 +41,9 @@ def direction(one: Seen, others: Others, expected: Expected | None = None) -> Fi
     if limits is None:
         return undecided(Name.DIRECTION, f"{stated}: what both may differ by is not known", apart)
     limit, of_mirror = limits
-    if apart > limit and mirror <= of_mirror:
-        why = f"{stated}: one of both was run the wrong way round; run both again"
-        return Finding(Name.DIRECTION, apart, limit, "µm", FindingVerdict.WRONG, why)
-    if apart <= limit and mirror > of_mirror:
-        return Finding(Name.DIRECTION, apart, limit, "µm", FindingVerdict.GOOD, stated)
+    if (apart > limit) is (mirror <= of_mirror):
+        wrong = f"{stated}: one of both was run the wrong way round; run both again"
+        return found(Name.DIRECTION, apart, limit, stated, wrong)
     why = "too alike to tell" if apart <= limit else "neither of them; something else differs"
     return Finding(Name.DIRECTION, apart, limit, "µm", FindingVerdict.CANNOT_TELL, f"{stated}: {why}")
 

@@ -75,6 +75,11 @@ def labelled(axes: Axes, x: str, y: str = "", title: str = "") -> None:
     axes.set(xlabel=x, ylabel=y, **({"title": title} if title else {}))
 
 
+def with_unit(text: str, unit: str) -> str:
+    """Return an axis's label; a quantity without a unit has none."""
+    return f"{text}, {unit}" if unit else text
+
+
 def heading(part: SubFigure, text: str) -> None:
     """Write the heading of a part of a figure."""
     part.suptitle(text, fontsize=9, x=0.01, ha="left")

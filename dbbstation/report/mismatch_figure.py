@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, ShownFigure, in_style, labelled
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, ShownFigure, in_style, labelled, with_unit
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
 from dbbstation.results.frame import OnePanel
 
@@ -63,11 +63,7 @@ def _over(axes: Axes, variable: Variable, before: Floats, after: Floats, unit: s
     for values, colour, label in ((before, BEFORE, "before"), (after, AFTER, "after")):
         at, mean = _means(variable.values, values)
         axes.plot(at, mean, color=colour, label=label, linewidth=1.2)
-    labelled(
-        axes,
-        f"{variable.name}{f', {variable.unit}' if variable.unit else ''}",
-        f"measured less simulated{f', {unit}' if unit else ''}",
-    )
+    labelled(axes, with_unit(variable.name, variable.unit), with_unit("measured less simulated", unit))
     axes.legend(loc="upper right")
 
 
@@ -81,7 +77,7 @@ def _means(at: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 def _histogram(axes: Axes, before: Floats, unit: str) -> None:
     axes.hist(before, BINS, color=MEASURED)
-    labelled(axes, f"measured less simulated{f', {unit}' if unit else ''}", "rows", "nothing was found that it follows")
+    labelled(axes, with_unit("measured less simulated", unit), "rows", "nothing was found that it follows")
 
 
 def _over_rows(axes: Axes, before: Floats, after: Floats, found: Mismatch) -> None:
@@ -91,11 +87,8 @@ def _over_rows(axes: Axes, before: Floats, after: Floats, found: Mismatch) -> No
     axes.plot(rows, after[::step], color=AFTER, linewidth=0.5, label="after")
     for block in found.table.blocks[1:]:
         axes.axvline(block.start, color=MEASURED, linewidth=0.5, linestyle=":")
-    labelled(
-        axes,
-        "row" + (" (dotted: runs)" if len(found.table.blocks) > 1 else ""),
-        f"measured less simulated{f', {found.table.unit}' if found.table.unit else ''}",
-    )
+    row = "row (dotted: runs)" if len(found.table.blocks) > 1 else "row"
+    labelled(axes, row, with_unit("measured less simulated", found.table.unit))
     axes.legend(loc="upper right")
 
 
@@ -109,10 +102,6 @@ def _held_out(axes: Axes, found: Mismatch) -> None:
     for k, (label, colour, values) in enumerate(pairs):
         axes.bar(at + 0.4 * k, values, 0.4, color=colour, label=label)
     axes.set_xticks(at + 0.2, [str(k + 1) for k in at])
-    labelled(
-        axes,
-        "part held out",
-        f"rms error{f', {found.table.unit}' if found.table.unit else ''}",
-        f"held out: {found.held_out.before:.3g} -> {found.held_out.after:.3g} {found.table.unit}".rstrip(),
-    )
+    title = f"held out: {found.held_out.before:.3g} -> {found.held_out.after:.3g} {found.table.unit}".rstrip()
+    labelled(axes, "part held out", with_unit("rms error", found.table.unit), title)
     axes.legend(loc="upper right")

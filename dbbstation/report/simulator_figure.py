@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, ShownFigure, in_style, labelled
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, ShownFigure, in_style, labelled, with_unit
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
 from dbbstation.results.frame import OnePanel
 
@@ -80,5 +80,4 @@ def _held_out(axes: Axes, answer: SimulatorComparison) -> None:
 
 
 def _label(answer: SimulatorComparison) -> str:
-    unit = answer.model.outputs[0].unit
-    return f"measured less simulated{f', {unit}' if unit else ''}"
+    return with_unit("measured less simulated", answer.model.outputs[0].unit)

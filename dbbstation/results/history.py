@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field
 
-from dbbstation.facts import picked
+from dbbstation.facts import of_facts, picked
 from dbbstation.facts.serialise import Kept
 from dbbstation.facts.value import finite
 from dbbstation.history.standardised import BASELINE
@@ -288,13 +288,12 @@ def _quantity(trend: Trend, sessions: Sequence[HistorySession], coverage_factor:
     watched, limit = trend.watched, trend.limit
     last = Size(abs(float(trend.values[-1])), float(np.nan_to_num(trend.u[-1])))
     beyond = np.abs(trend.values) - coverage_factor * np.nan_to_num(trend.u)
-    return QuantityHistory(
+    return of_facts(
+        QuantityHistory,
+        trend.subject,
         quantity=trend.label,
-        figure=trend.subject.figure,
         test=trend.subject.test or None,
         direction=trend.subject.direction or None,
-        of=trend.subject.of,
-        unit=trend.subject.unit,
         verdict=str(trend.verdict),
         why_not=trend.why_not or None,
         limit=limit,

@@ -86,12 +86,16 @@ def _under_spindle(ball: Ball, circle: Circle, *, put_up: bool) -> tuple[str, ..
     """Return the steps of the standard circular test [CAL III-A], beginning with the move to the circle's centre and tilt."""
     if not put_up:
         return (f"Leave the ball {ball.name} and the moving ball as they stand, do not touch them", _tilt(circle))
-    a, b, c = circle.tilt_deg
-    pose = f"{_place(ball.centre_mm)} A {a:g}° B {b:g}°" + (f" C {c:g}°" if c else "")
     return (
-        f"Drive the machine to {pose} and put the ball {ball.name} up under the spindle",
+        f"Drive the machine to {_place(ball.centre_mm)} {tilt_words(circle)} and put the ball {ball.name} up under the spindle",
         "With a micrometer: read now how far both balls are from the tool tip, and note it for the session file",
     )
+
+
+def tilt_words(circle: Circle) -> str:
+    """Return the tool's tilt; C only if it is not zero."""
+    a, b, c = circle.tilt_deg
+    return f"A {a:g}° B {b:g}°" + (f" C {c:g}°" if c else "")
 
 
 def _tilt(circle: Circle) -> str:

@@ -60,40 +60,36 @@ _ALWAYS = {Trigger.QUIT: State.STOPPED, Trigger.FAILED: State.FAULTED}
 _GIVEN_UP = {Trigger.REPEAT: State.BETWEEN, Trigger.REJECT: State.BETWEEN}
 _OTHER_RUN = {Trigger.GO_TO: State.BETWEEN, Trigger.JUDGE: State.BETWEEN, Trigger.PAUSE: State.PAUSED}
 
-_WAYS: Mapping[State, Mapping[Trigger, State]] = MappingProxyType(
-    {
-        State.BETWEEN: {
-            Trigger.RUN_LEFT: State.ANNOUNCED,
-            Trigger.NONE_LEFT: State.FINISHED,
-            # A run that was recorded before, and was not judged.
-            Trigger.CIRCLE_FOUND: State.COMPLETE,
-            Trigger.CIRCLE_MISSING: State.FLAWED,
-        }
-        | _ALWAYS,
-        State.ANNOUNCED: {Trigger.START: State.ARMED, Trigger.SKIP: State.BETWEEN} | _OTHER_RUN | _ALWAYS,
-        State.ARMED: {
-            Trigger.BAR_OUTSIDE: State.DWELLING,
-            Trigger.REPEAT: State.BETWEEN,
-            Trigger.SKIP: State.BETWEEN,
-            Trigger.LATE: State.BETWEEN,
-        }
-        | _OTHER_RUN
-        | _ALWAYS,
-        State.DWELLING: {Trigger.FED_IN: State.TURNING, Trigger.LATE: State.FLAWED} | _GIVEN_UP | _ALWAYS,
-        State.TURNING: {Trigger.FED_OUT: State.LEAVING, Trigger.LENGTH_GONE: State.FLAWED, Trigger.LATE: State.FLAWED}
-        | _GIVEN_UP
-        | _ALWAYS,
-        State.LEAVING: {Trigger.CIRCLE_FOUND: State.COMPLETE, Trigger.CIRCLE_MISSING: State.FLAWED}
-        | _GIVEN_UP
-        | _ALWAYS,
-        State.COMPLETE: {Trigger.ACCEPT: State.BETWEEN} | _GIVEN_UP | _ALWAYS,
-        State.FLAWED: _GIVEN_UP | _ALWAYS,
-        State.PAUSED: {Trigger.RESUME: State.BETWEEN} | _ALWAYS,
-        State.FINISHED: {},
-        State.STOPPED: {},
-        State.FAULTED: {},
+_WAYS: Mapping[State, Mapping[Trigger, State]] = {
+    State.BETWEEN: {
+        Trigger.RUN_LEFT: State.ANNOUNCED,
+        Trigger.NONE_LEFT: State.FINISHED,
+        # A run that was recorded before, and was not judged.
+        Trigger.CIRCLE_FOUND: State.COMPLETE,
+        Trigger.CIRCLE_MISSING: State.FLAWED,
     }
-)
+    | _ALWAYS,
+    State.ANNOUNCED: {Trigger.START: State.ARMED, Trigger.SKIP: State.BETWEEN} | _OTHER_RUN | _ALWAYS,
+    State.ARMED: {
+        Trigger.BAR_OUTSIDE: State.DWELLING,
+        Trigger.REPEAT: State.BETWEEN,
+        Trigger.SKIP: State.BETWEEN,
+        Trigger.LATE: State.BETWEEN,
+    }
+    | _OTHER_RUN
+    | _ALWAYS,
+    State.DWELLING: {Trigger.FED_IN: State.TURNING, Trigger.LATE: State.FLAWED} | _GIVEN_UP | _ALWAYS,
+    State.TURNING: {Trigger.FED_OUT: State.LEAVING, Trigger.LENGTH_GONE: State.FLAWED, Trigger.LATE: State.FLAWED}
+    | _GIVEN_UP
+    | _ALWAYS,
+    State.LEAVING: {Trigger.CIRCLE_FOUND: State.COMPLETE, Trigger.CIRCLE_MISSING: State.FLAWED} | _GIVEN_UP | _ALWAYS,
+    State.COMPLETE: {Trigger.ACCEPT: State.BETWEEN} | _GIVEN_UP | _ALWAYS,
+    State.FLAWED: _GIVEN_UP | _ALWAYS,
+    State.PAUSED: {Trigger.RESUME: State.BETWEEN} | _ALWAYS,
+    State.FINISHED: {},
+    State.STOPPED: {},
+    State.FAULTED: {},
+}
 """New state for each trigger that changes the state."""
 
 TRANSITIONS: Mapping[State, Mapping[Trigger, State]] = MappingProxyType(

@@ -40,7 +40,6 @@ def histories_in(
     source_files: Sequence[Path] = (),
     *,
     rebuild: bool = False,
-    now: datetime | None = None,
     counted: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> HistoryResult:
     """Return the histories of all machines with sessions in a folder, at most four levels deep.
@@ -48,7 +47,6 @@ def histories_in(
     Args:
         folder: with sessions, and models of `calibrate` or `diagnose`.
         rebuild: ignore the index.
-        now: None: the clock's time.
 
     Raises:
         InputError: no usable session; an unknown test.
@@ -66,7 +64,7 @@ def histories_in(
             for name, one in reading.every(found.models, ModelFigures, work, lambda _model: source_files).items()
         ]
         kept.drop_others([*found.sessions, *found.models])
-        moment = now or datetime.now(UTC)
+        moment = datetime.now(UTC)
         folders = {_called(name): path.parent for name, path in found.sessions.items()}
         seals = [note for one in sessions if (note := _seal_note(kept, folders[one.name], one, moment))]
         notes = [*([kept.problem] if kept.problem else []), *seals]
@@ -87,7 +85,7 @@ def histories_in(
     notes = [*unlike, *notes, *alike]
     machines = histories(dated, by_session, asked)
     for machine in machines:
-        notes += date_faults(machine.sessions, now or datetime.now(UTC))
+        notes += date_faults(machine.sessions, moment)
         notes += _gathered(machine.sessions)
     warned = {one.name: by_session[one.sha256].warnings for one in dated if one.sha256 in by_session}
     return history_result(machines, asked, left_out, notes, reading.worked_out, warned)

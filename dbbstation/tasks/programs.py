@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import hashlib
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import ArgumentError
 from dbbstation.files.formats.linuxcnc_control import parameters_of, tools_of
+from dbbstation.files.gateway import sha256_of_blocks
 from dbbstation.files.source_text import blocks_of
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse
@@ -99,10 +99,7 @@ def hashed(path: Path) -> str:
 
 def sha256_of(path: Path) -> str:
     """Return the SHA-256 of a file; raises InputError if unreadable."""
-    digest = hashlib.sha256()
-    for block in blocks_of(path):
-        digest.update(block)
-    return digest.hexdigest()
+    return sha256_of_blocks(blocks_of(path))
 
 
 def source_of(program: str | PathLike[str] | ProgramText) -> Path | ProgramText:

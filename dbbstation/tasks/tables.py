@@ -178,11 +178,10 @@ def load_rows(tables: Sequence[Path | Columns], asked: TableOptions, like: Table
         read_table(one, needed, asked.numbers) if isinstance(one, Path) else given_table(one, needed) for one in tables
     ]
     reader = _Reader(files, asked, like.unit)
-    values = reader.values
-    rows, blocks, names = reader.order(values, [name for name in needed if name != asked.run], clock)
+    rows, blocks, names = reader.order([name for name in needed if name != asked.run], clock)
     if not len(rows):
         raise InputError.of(files[0].file, "no row has all values", "fill them in", line=files[0].header)
-    kept = {name: column[rows] for name, column in values.items()}
+    kept = {name: column[rows] for name, column in reader.values.items()}
     variables = tuple(replace(v, values=kept[v.name], range=(v.low, v.high)) for v in like.variables)
     table = replace(
         like,
@@ -260,16 +259,15 @@ class _Reader:
 
     def read(self) -> Tabulated:
         """Return the table."""
-        asked, values = self._asked, self.values
-        chosen, derivatives = self._chosen(values), self._derivatives(values)
+        asked, chosen, derivatives = self._asked, self._chosen(), self._derivatives()
         clock = self._clock(chosen)
         used = [asked.measured, asked.simulated, *chosen, *derivatives, *([clock] if clock else [])]
-        rows, blocks, names = self.order(values, used, clock)
+        rows, blocks, names = self.order(used, clock)
         if len(rows) < FEWEST_ROWS:
             file = self._files[0]
             what = f"{len(rows)} rows with all values are too few to compare, {FEWEST_ROWS} are needed"
             raise InputError.of(file.file, what, "record more", line=file.header)
-        kept = {name: column[rows] for name, column in values.items()}
+        kept = {name: column[rows] for name, column in self.values.items()}
         self._refuse_constant(kept[asked.measured], kept[asked.simulated])
         variables = [self._variable(name, kept[name]) for name in chosen]
         varying = [v for v in variables if v is not None and not self._is_the_difference(v, kept)]
@@ -320,11 +318,11 @@ class _Reader:
         faults += [Problem.of("--free", f"`{name}` is also stated with --known", "give it once") for name in both]
         refuse(faults)
 
-    def _derivatives(self, values: Mapping[str, Floats]) -> list[str]:
+    def _derivatives(self) -> list[str]:
         found = [name for name in self.names if name.startswith(DERIVATIVE) and len(name) > len(DERIVATIVE)]
-        return [name for name in found if self._is_numeric(name, values[name])]
+        return [name for name in found if self._is_numeric(name)]
 
-    def _chosen(self, values: Mapping[str, Floats]) -> list[str]:
+    def _chosen(self) -> list[str]:
         asked = self._asked
         if asked.variables is not None:
             return list(asked.variables)
@@ -333,7 +331,7 @@ class _Reader:
         siblings = [name for name in others if self._is_another_pair(name)]
         if siblings:
             self.notes.append(f"measured or simulated themselves and left out: {', '.join(siblings)}")
-        return [name for name in others if name not in siblings and self._is_numeric(name, values[name])]
+        return [name for name in others if name not in siblings and self._is_numeric(name)]
 
     def _is_another_pair(self, name: str) -> bool:
         """Return whether a column's name shows that it belongs to another pair of measured and simulated values."""
@@ -361,11 +359,12 @@ class _Reader:
         what += f" is {size} in every row: no difference is left to explain"
         raise InputError.of(file.file, what, "check that these are the columns that you mean", line=file.header)
 
-    def _is_numeric(self, name: str, column: Floats) -> bool:
+    def _is_numeric(self, name: str) -> bool:
         bad = sum(len(file.faults_of(name)) for file in self._files)
         if all(file.is_text(name) for file in self._files):
             self.notes.append(f"`{name}` has no numbers and is left out")
             return False
+        column = self.values[name]
         missing = int((~np.isfinite(column)).sum())
         if bad or missing > len(column) // 10:
             first = next((fault for file in self._files for fault in file.faults_of(name)), None)
@@ -380,10 +379,9 @@ class _Reader:
             return None if asked.time == ROWS else asked.time
         return next((name for name in chosen if self._meaning(name).kind is Kind.TIME), None)
 
-    def order(
-        self, values: Mapping[str, Floats], used: Sequence[str], clock: str | None
-    ) -> tuple[Integers, tuple[slice, ...], tuple[str, ...]]:
+    def order(self, used: Sequence[str], clock: str | None) -> tuple[Integers, tuple[slice, ...], tuple[str, ...]]:
         """Return the complete rows in time order within each block, the blocks, and their names."""
+        values = self.values
         good = np.all([np.isfinite(values[name]) for name in dict.fromkeys(used)], axis=0)
         if not good.all():
             self.notes.append(f"{int((~good).sum())} of {len(good)} rows lack a number and are left out")

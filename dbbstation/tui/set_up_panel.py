@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from textual.containers import Horizontal
 from textual.content import Content, Span
 
+from dbbstation.station.sequencer import tilt_words
 from dbbstation.station.states import State
 from dbbstation.tui.panel import Panel, lines
 from dbbstation.tui.reading_panel import ReadingPanel
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
     from textual.app import ComposeResult
 
-    from dbbstation.plan.plan import Ball, Circle
+    from dbbstation.plan.plan import Ball
     from dbbstation.service.board import Board
     from dbbstation.station.events import RunAnnounced
 
@@ -82,7 +83,7 @@ class SetUpPanel(Panel):
             ),
             Content.assemble(what, " ", (on, "bold")),
             Content.assemble("ball ", (ball.name, "bold")),
-            Content.assemble("tilt ", (_tilt(circle), "bold")),
+            Content.assemble("tilt ", (tilt_words(circle), "bold")),
             Content.assemble(f"bar {circle.bar_mm:g} mm {raised}", _too_slow(announced)),
         )
 
@@ -126,8 +127,3 @@ def _too_slow(announced: RunAnnounced) -> Content:
     if seen is None or seen.enough:
         return Content("")
     return Content.styled(f", only {seen.points_per_turn:.0f} points per turn", "$text-warning")
-
-
-def _tilt(circle: Circle) -> str:
-    a, b, c = circle.tilt_deg
-    return f"A {a:g}° B {b:g}°" + (f" C {c:g}°" if c else "")

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 import numpy as np
 
+from dbbstation.inference.forms import Clock
 from dbbstation.inference.square_root import Block, Columns, compress, lost_directions, slices, solve
 from dbbstation.inference.triangle import ROUNDING, norms, rms
 
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.facts.value import Value
-    from dbbstation.inference.forms import Clock
     from dbbstation.inference.patterns import Choices, Family, Pattern
     from dbbstation.inference.square_root import Solution
     from dbbstation.laws.contract import SourceForm
@@ -343,6 +343,11 @@ class Channel:
         for rows in self.blocks:
             grid[rows.start : rows.stop : apart] = True
         return replace(self, kept=self.kept & grid, apart=apart)
+
+    @cached_property
+    def row_clock(self) -> Clock:
+        """Return the clock, by default of gapless rows with immediate response."""
+        return Clock.plain(len(self.residual)) if self.clock is None else self.clock
 
     @property
     def target(self) -> Floats:

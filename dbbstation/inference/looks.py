@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.bank import Bank
-    from dbbstation.inference.channel import Channel
     from dbbstation.inference.model_comparison import Member
 
 
@@ -404,7 +403,7 @@ def seen(bank: Bank, members: Sequence[Member], *, in_time: bool) -> list[Patter
     size = channel.size / left.noise
     found = looked_for(left, channel.variables, channel.kept, size)
     if in_time and channel.time is not None:
-        found += _in_time(left, channel, size)
+        found += stretches(left, channel, size)
     return bank.worthy(left, found)
 
 
@@ -438,18 +437,9 @@ def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) ->
         if pattern.family in PLACED:
             better = placed_better(pattern, _left(bank, others, sd), channel.kept, size)
         else:
-            better = refined(
-                pattern,
-                count,
-                LeftBesideOthers(
-                    Fitting.of(others, sd, bank.noise, bank.whitening), member.sd[:count], bank.target, bank.whitened
-                ),
-                channel.blocks,
-                channel.kept,
-                size,
-                clock=channel.clock,
-                direction=channel.direction if pattern.family is Family.PULSES_BY_DIRECTION else None,
-            )
+            fitting = Fitting.of(others, sd, bank.noise, bank.whitening)
+            lefts = LeftBesideOthers(fitting, member.sd[:count], bank.target, bank.whitened)
+            better = refined(pattern, count, lefts, channel, size)
         if better.name == pattern.name or better.name in bank.patterns:
             continue
         bank.drop({pattern.name})
@@ -457,10 +447,3 @@ def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) ->
         cause = next(cause for cause in bank.causes if cause.name == better.name)
         members[number] = replace(member, cause=cause, variant=cause.widest)
     return tuple(members)
-
-
-def _in_time(left: Left, channel: Channel, size: float) -> list[Pattern]:
-    by = None
-    if channel.time is not None and channel.direction is not None:
-        by = (Variable("time", channel.time_unit, Kind.TIME, channel.time), channel.direction)
-    return stretches(left, channel.blocks, channel.kept, size, clock=channel.clock, by=by)

@@ -9,15 +9,17 @@ import numpy as np
 from scipy.special import gammaln
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.forms import Clock, Stretches
+from dbbstation.inference.channel import Kind, Variable
+from dbbstation.inference.forms import Stretches
 from dbbstation.inference.patterns import Family, Pattern
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.computing.arrays import Flags, Floats, Integers
-    from dbbstation.inference.channel import Variable
+    from dbbstation.computing.arrays import Floats, Integers
+    from dbbstation.inference.channel import Channel
     from dbbstation.inference.coloured import Coloured, Left
+    from dbbstation.inference.forms import Clock
 
 SHORTEST = 3
 """Shortest stretch in rows; a single wrong value is no effect of the object."""
@@ -30,29 +32,21 @@ class _Window:
     worth: float
 
 
-def stretches(
-    left: Left,
-    blocks: Sequence[slice],
-    kept: Flags,
-    size: float,
-    *,
-    clock: Clock | None = None,
-    by: tuple[Variable, Floats] | None = None,
-) -> list[Pattern]:
+def stretches(left: Left, channel: Channel, size: float) -> list[Pattern]:
     """Return significant stretches as patterns of one, two and more stretches.
 
     Args:
+        channel: with times; its directions of travel, if any, are for effects that change sign with them.
         size: prior standard deviation, over noise.
-        clock: None for gapless rows and immediate steps.
-        by: time, and directions of travel, shape (n,), for effects that change sign with direction.
     """
-    clock = Clock.plain(len(kept)) if clock is None else clock
-    kinds: list[tuple[Family, tuple[Variable, ...], Floats]] = [(Family.PULSES, (), np.ones(len(kept)))]
-    if by is not None:
-        kinds.append((Family.PULSES_BY_DIRECTION, (by[0],), by[1]))
+    clock, ones = channel.row_clock, np.ones(len(channel.kept))
+    kinds: list[tuple[Family, tuple[Variable, ...], Floats]] = [(Family.PULSES, (), ones)]
+    if channel.time is not None and channel.direction is not None:
+        time = Variable("time", channel.time_unit, Kind.TIME, channel.time)
+        kinds.append((Family.PULSES_BY_DIRECTION, (time,), channel.direction))
     patterns = []
     for family, over, factor in kinds:
-        look = _Look(left, blocks, kept, size, clock, factor[kept])
+        look = _Look(left, channel, size, factor)
         found: list[tuple[float, float]] = []
         while len(found) < BOUNDS.stretches:
             best = look.best()
@@ -69,23 +63,16 @@ def stretches(
 
 
 def refined(
-    pattern: Pattern,
-    count: int,
-    lefts: Callable[[int, Floats], Left],
-    blocks: Sequence[slice],
-    kept: Flags,
-    size: float,
-    *,
-    clock: Clock | None = None,
-    direction: Floats | None = None,
+    pattern: Pattern, count: int, lefts: Callable[[int, Floats], Left], channel: Channel, size: float
 ) -> Pattern:
     """Return the pattern's first stretches, with optimised ends, as a pattern.
 
     Args:
         lefts: function from a stretch's number and all columns, shape (n, count), to the residual without this stretch.
     """
-    clock = Clock.plain(len(kept)) if clock is None else clock
-    factor = np.ones(len(kept)) if direction is None else direction
+    clock, kept = channel.row_clock, channel.kept
+    by = channel.direction if pattern.family is Family.PULSES_BY_DIRECTION else None
+    factor = np.ones(len(kept)) if by is None else by
     form = pattern.form
     if not isinstance(form, Stretches):
         return pattern
@@ -100,7 +87,7 @@ def refined(
         # Refinement of the others may have made it too short, also at the end of the rows.
         window[0, 1] = max(window[0, 1], min(window[0, 0] + SHORTEST, int(kept.sum())))
         window[0, 0] = min(window[0, 0], window[0, 1] - SHORTEST)
-        look = _Look(lefts(k, columns), blocks, kept, size, clock, factor[kept], window)
+        look = _Look(lefts(k, columns), channel, size, factor, window)
         look.tried = pattern.tried
         best = look.best()
         if best is not None and (k not in doubtful or best.worth > 0.0):
@@ -150,18 +137,12 @@ class _Look:
     """Search for the best window by cumulative sums: first by bins, then by rows at both ends."""
 
     def __init__(
-        self,
-        left: Left,
-        blocks: Sequence[slice],
-        kept: Flags,
-        size: float,
-        clock: Clock,
-        factor: Floats,
-        windows: Integers | None = None,
+        self, left: Left, channel: Channel, size: float, factor: Floats, windows: Integers | None = None
     ) -> None:
-        self._left, self._size, self._clock, self._factor = left, size, clock, factor
-        self._rows, self._at = np.flatnonzero(kept), clock.rows[kept]
-        ends = np.searchsorted(self._rows, [[b.start, b.stop] for b in blocks])
+        kept, factor = channel.kept, factor[channel.kept]
+        self._left, self._size, self._clock, self._factor = left, size, channel.row_clock, factor
+        self._rows, self._at = np.flatnonzero(kept), self._clock.rows[kept]
+        ends = np.searchsorted(self._rows, [[b.start, b.stop] for b in channel.blocks])
         self._blocks = [(int(a), int(b)) for a, b in ends if b - a >= 2 * SHORTEST]
         self._axes, self._rest = _Growing(left.axes), left.rest
         self._whole = _cumulative(left.whitened(factor) ** 2)

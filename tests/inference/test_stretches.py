@@ -132,9 +132,9 @@ def test_the_likelihood_of_long_tails_is_that_of_students_t(rng):
 def test_a_stretch_that_came_to_be_too_short_is_sought_among_long_enough_ones(rng, edges):
     rows = 40
     left = Left(rng.normal(0.0, 1.0, rows), np.zeros((rows, 0)), 1.0, Coloured(1.0), None)
-    clock = Clock.plain(rows)
-    pattern = _pattern(Family.PULSES, (), [edges], clock, np.ones(rows), 10.0)
-    found = refined(pattern, 1, lambda _k, _columns: left, [slice(0, rows)], np.ones(rows, dtype=bool), 1.0)
+    channel = made(np.zeros(rows))
+    pattern = _pattern(Family.PULSES, (), [edges], channel.row_clock, np.ones(rows), 10.0)
+    found = refined(pattern, 1, lambda _k, _columns: left, channel, 1.0)
     assert np.count_nonzero(found.samples[:, 0]) >= SHORTEST - 1
 
 

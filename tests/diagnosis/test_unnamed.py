@@ -14,7 +14,7 @@ from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.oddities import CreepingSpindle, CyclingChiller, RockingTable, SpringyDrive, WindingCable
 from tests.plant.mechanisms.outsiders import BuildingSway, DentedScrew, HoseDrag, LobedSocket, SoftFloor
 from tests.plant.plan import ALL, EIGHT, subset, table_ii_plan
-from tests.plant.session import record
+from tests.plant.session import MEANS_OF_TWO_HZ, record
 
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 pytestmark = pytest.mark.slow
@@ -24,7 +24,7 @@ NAMES = ("backlash", "bar-drift")
 def left(folder, seed, *mechanisms, tests=EIGHT):
     """What has no name in a recording, of which nothing is named."""
     plan = subset(table_ii_plan(seed), tests)
-    record(folder, seed=seed, plan=plan, mechanisms=[KINEMATICS, *mechanisms], rate_hz=10.0)
+    record(folder, seed=seed, plan=plan, mechanisms=[KINEMATICS, *mechanisms], rate_hz=MEANS_OF_TWO_HZ)
     recorded = load_sessions([folder])
     found = diagnose(recorded.machine, recorded.observations, sources_named(NAMES))
     assert {f.name for f in found.sources if f.verdict is Verdict.IDENTIFIED} == set()

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 ASKED = TableOptions("measured_mm", "simulated_mm")
 
 
-@pytest.fixture(autouse=True, params=[10.0, pytest.param(20.0, marks=pytest.mark.nightly)], ids=["10 Hz", "20 Hz"])
+@pytest.fixture(autouse=True, params=[5.0, pytest.param(20.0, marks=pytest.mark.nightly)], ids=["5 Hz", "20 Hz"])
 def rate_hz(request, monkeypatch):
     """Readings a second."""
     monkeypatch.setattr(plant, "RATE_HZ", request.param)
@@ -116,7 +116,7 @@ def test_what_is_measured_late_has_a_delay_that_is_positive(rng):
 
 
 def test_a_step_and_a_pulse_are_placed_in_time(tmp_path, monkeypatch):
-    monkeypatch.setattr(plant, "RATE_HZ", 20.0)  # edges to a third of a second
+    monkeypatch.setattr(plant, "RATE_HZ", 10.0)  # edges to a third of a second
     found = found_in(tmp_path, Truth(step_um=6.0, pulse_um=12.0))
     stretches = sorted(rows for finding in found.there for rows in finding.rows)
     times = found.table.clock.values
@@ -185,6 +185,7 @@ def test_rows_that_are_held_back_decide_nothing(tmp_path):
 
 @pytest.mark.parametrize("name", ["twice", "product", "play"])
 def test_what_a_first_list_shows_to_be_hopeless_is_never_taken_in(tmp_path, monkeypatch, name):
+    monkeypatch.setattr(plant, "RATE_HZ", 10.0)  # a product shows without its linear parts
     path = record(FOUND[name][0]).write(tmp_path / "x.csv")
     channel = load_tables([path], ASKED).table.channel(())
     bank = Bank(channel)
@@ -214,7 +215,7 @@ def test_a_robot_measured_by_a_laser_tracker(recordings, tmp_path, rate_hz):
         pytest.skip(f"{path} is not there")
     names, *lines = path.read_text(encoding="utf-8").splitlines()
     fewer = tmp_path / "ur10.csv"
-    fewer.write_text("\n".join([names, *lines[:: 8 if rate_hz == 10.0 else 4]]) + "\n", encoding="utf-8")
+    fewer.write_text("\n".join([names, *lines[:: 8 if rate_hz == 5.0 else 4]]) + "\n", encoding="utf-8")
     asked = TableOptions("measured_mm", "model_mm", {"q1": None, "q2": None, "q3": None})
     found = find_mismatch(load_tables([fewer], asked).table)
     q1 = np.radians(found.table.columns["q1"])

@@ -81,12 +81,14 @@ def test_counts_find_what_they_look_for():
 
 
 def starts_the_command_line(tree):
-    """Whether a process of the command line is begun: `python -m dbbstation`, or `python_module("dbbstation")`."""
+    """Whether a process of the command line is begun: `python -m dbbstation`, `python_module("dbbstation")` or `copies("dbbstation", …)`."""
     lists = [node.elts for node in ast.walk(tree) if isinstance(node, ast.List | ast.Tuple)]
     calls = [
         node.args
         for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "python_module"
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in {"python_module", "copies"}
     ]
     words = [{one.value for one in found if isinstance(one, ast.Constant)} for found in lists]
     return any(one >= {"-m", "dbbstation"} for one in words) or any(

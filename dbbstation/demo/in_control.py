@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.control.parameters import Values, hal_lines, home_mm, tables
-from dbbstation.demo.whole_job import DemoJob, write_plan, write_truth
+from dbbstation.demo.whole_job import DemoJob, copied_commands, write_plan, write_truth
 from dbbstation.errors import StationError
 from dbbstation.facts.serialise import as_objects
 from dbbstation.files.atomic import write_text
@@ -90,7 +90,13 @@ def run_ways(
     refuse_without_linuxcnc()
     folder.mkdir(parents=True, exist_ok=True)
     machine = _write_files(folder, seed, tests)
-    job = DemoJob(folder, ["--plan", "plan.yaml", "--machine", "machine.yaml"], tell, progress)
+    with copied_commands() as start:
+        job = DemoJob(folder, ["--plan", "plan.yaml", "--machine", "machine.yaml"], tell, progress, start)
+        return _ways(job, machine, seed, model)
+
+
+def _ways(job: DemoJob, machine: Machine, seed: int, model: str) -> tuple[ControlWay, ...]:
+    folder = job.folder
     program = ["program", *job.what, "--dialect", "linuxcnc", "--bar-stays-on", "--force"]
     job.answer([*program, "--out", "programs"])
     plain = genhexkins(machine, None)
@@ -162,7 +168,7 @@ def _session(
 ) -> None:
     """Measure a machine on the paths that LinuxCNC drives; remove an interrupted measurement first."""
     shutil.rmtree(job.folder / name, ignore_errors=True)
-    of_this = DemoJob(job.folder, ["--plan", "plan.yaml", "--machine", machine], job.tell, job.progress)
+    of_this = replace(job, what=["--plan", "plan.yaml", "--machine", machine])
     with job.emulated(["--truth", truth, "--seed", str(seed), "--programs", f"driven/{driven.name}"]) as place:
         of_this.measure(place, name, ["--programs", programs])
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -23,14 +22,16 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.results.demo import DemoCircle, DemoResult, MeasuredBeforeAfter
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
-from dbbstation.system.children import python_module
+from dbbstation.system.copies import copies
 from dbbstation.virtual.truth import random_kinematics
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from dbbstation.files.formats.plan import PlanFile
+    from dbbstation.system.copies import Starter
     from dbbstation.tasks.telling import Progress
 
 INSTRUMENT = "streaming-encoder"
@@ -42,8 +43,6 @@ COMPLIANCE_UM_KN = 9.68
 
 QUICK = ("a", "h", "n")
 """Tests of a quick demonstration: one at each height, two of them tilted."""
-
-PATIENCE_S = 60.0
 
 _CIRCLE = re.compile(r"(\d+) of (\d+): (test .*)")
 """Pattern of the line that `measure` prints when a circle begins."""
@@ -81,25 +80,27 @@ def run_demo(
     plan_file = shipped_folder("protocols") / "plans" / "table2.yaml"
     if tests is not None:
         plan_file = write_plan(folder / "plan.yaml", read_inline_plan(plan_file), tests)
-    write_truth(folder / "truth.yaml", machine_file, seed)
-    write_text(folder / "dbbstation-settings.yaml", SETTINGS)
-    job = DemoJob(folder, ["--plan", str(plan_file.resolve()), "--machine", str(machine_file)], tell, progress)
-    # One virtual machine for both measurements: balls and bar stay, every holder is put up anew. It reads programs
-    # when they are started, so that their folder may still be empty.
-    (folder / "programs").mkdir()
-    truth = ["--truth", "truth.yaml", "--seed", str(seed), "--programs", "programs"]
-    with job.emulated(truth) as place:
-        job.measure(place, "measured", [])
-        calibration = job.answer(["calibrate", "measured", "--out", "kinematic.yaml"])
-        diagnosis = job.answer(["diagnose", "measured", "--out", "joint.yaml"])
-        job.answer(["program", *job.what, "--dialect", "linuxcnc", "--model", "joint.yaml", "--out", "programs"])
-        job.measure(place, "verified", ["--programs", "programs"])
-    before, after = (
-        _read(job.answer(["evaluate", session, "--model", "joint.yaml"])) for session in ("measured", "verified")
-    )
-    report = job.answer(
-        ["report", "verified", "--before", "measured", "--model", "joint.yaml", "--page", "report.html"]
-    )
+    with copied_commands() as start:
+        write_truth(folder / "truth.yaml", machine_file, seed)
+        write_text(folder / "dbbstation-settings.yaml", SETTINGS)
+        what = ["--plan", str(plan_file.resolve()), "--machine", str(machine_file)]
+        job = DemoJob(folder, what, tell, progress, start)
+        # One virtual machine for both measurements: balls and bar stay, every holder is put up anew. It reads programs
+        # when they are started, so that their folder may still be empty.
+        (folder / "programs").mkdir()
+        truth = ["--truth", "truth.yaml", "--seed", str(seed), "--programs", "programs"]
+        with job.emulated(truth) as place:
+            job.measure(place, "measured", [])
+            calibration = job.answer(["calibrate", "measured", "--out", "kinematic.yaml"])
+            diagnosis = job.answer(["diagnose", "measured", "--out", "joint.yaml"])
+            job.answer(["program", *job.what, "--dialect", "linuxcnc", "--model", "joint.yaml", "--out", "programs"])
+            job.measure(place, "verified", ["--programs", "programs"])
+        before, after = (
+            _read(job.answer(["evaluate", session, "--model", "joint.yaml"])) for session in ("measured", "verified")
+        )
+        report = job.answer(
+            ["report", "verified", "--before", "measured", "--model", "joint.yaml", "--page", "report.html"]
+        )
     return DemoResult(
         folder,
         _side_by_side(before, after),
@@ -127,6 +128,11 @@ def write_plan(path: Path, whole: PlanFile, names: Collection[str]) -> Path:
     return path
 
 
+def copied_commands() -> AbstractContextManager[Starter]:
+    """Return what runs the commands: copies of a process that has imported them."""
+    return copies("dbbstation", "dbbstation.demo.loaded")
+
+
 @dataclass(frozen=True)
 class _Place:
     """Port of the virtual instrument and control address of the machine."""
@@ -143,16 +149,16 @@ class DemoJob:
     what: list[str]
     tell: Callable[[str], None]
     progress: Progress
+    start: Starter
 
     def answer(self, arguments: list[str]) -> str:
         """Run a command and return its JSON."""
         self.tell("dbbstation " + " ".join(_short(argument) for argument in arguments))
-        done = subprocess.run(
-            [*_PROGRAM, *arguments, "--json"], cwd=self.folder, capture_output=True, text=True, check=False
-        )
-        if done.returncode != 0:
-            raise StationError(done.stderr.strip(), where=f"dbbstation {arguments[0]}")
-        return done.stdout
+        with self.start([*arguments, "--json"], self.folder, answers=True) as process:
+            printed, said = process.communicate()
+            if process.wait() != 0:
+                raise StationError(said.strip(), where=f"dbbstation {arguments[0]}")
+        return printed
 
     def measure(self, place: _Place, session: str, programs: list[str]) -> None:
         """Measure the virtual machine over its serial line."""
@@ -160,20 +166,14 @@ class DemoJob:
         line = ["--port", place.port, "--auto", place.control, *RATE]
         bar = ["--bar-length-mm", "150", "--bar-uncertainty-um", "0.5"]
         self.tell("dbbstation " + " ".join(_short(argument) for argument in [*arguments, *line]))
-        with subprocess.Popen(
-            [*_PROGRAM, *arguments, *line, *bar],
-            cwd=self.folder,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        ) as process:
+        with self.start([*arguments, *line, *bar], self.folder, answers=False) as process:
             said = []
             for text in process.stderr or ():
                 said.append(text.rstrip())
                 if begins := _CIRCLE.fullmatch(text.strip()):
                     self.progress(begins[3], int(begins[1]) - 1, int(begins[2]))
-        if process.returncode != 0:
-            raise StationError("\n".join(said[-5:]), where="dbbstation measure")
+            if process.wait() != 0:
+                raise StationError("\n".join(said[-5:]), where="dbbstation measure")
 
     @contextmanager
     def emulated(self, arguments: list[str]) -> Iterator[_Place]:
@@ -185,31 +185,14 @@ class DemoJob:
         Raises:
             StationError: it does not start.
         """
-        command = [
-            *_PROGRAM,
-            "instrument",
-            "emulate",
-            "--instrument",
-            INSTRUMENT,
-            *self.what,
-            *arguments,
-            *RATE,
-            "--wait",
-            "--json",
-        ]
-        process = subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        try:
+        words = ["instrument", "emulate", "--instrument", INSTRUMENT, *self.what, *arguments, *RATE, "--wait", "--json"]
+        with self.start(words, self.folder, answers=True) as process:
             first = process.stdout.readline() if process.stdout else ""
             if not first:
-                _, said = process.communicate(timeout=PATIENCE_S)
+                _, said = process.communicate()
                 raise StationError(said.strip() or "it ended at once", where="dbbstation instrument emulate")
             yield read_json(_Place, first)
-        finally:
             process.terminate()
-            process.communicate(timeout=PATIENCE_S)
-
-
-_PROGRAM = python_module("dbbstation")
 
 
 def _short(argument: str) -> str:

@@ -22,6 +22,7 @@ from tests.cli.test_report_command import Page
 from tests.tasks.fleet_sessions import machines
 
 COUNT = 4
+ONE_TEST = fleet_module.FleetOptions({"tests": ("a",)})
 
 
 @pytest.fixture(scope="module")
@@ -110,9 +111,9 @@ def test_one_table_has_every_value_and_one_page_a_row_for_each_machine(calibrate
 
 @pytest.mark.usefixtures("here")
 def test_what_is_up_to_date_is_not_done_again(sessions, tmp_path, monkeypatch):
-    out, one_test = tmp_path / "out", fleet_module.FleetOptions({"tests": ("a",)})
+    out = tmp_path / "out"
 
-    def again(options=one_test, **how):
+    def again(options=ONE_TEST, **how):
         return states(fleet([sessions], "circles", out, options=options, **how))
 
     assert set(again().values()) == {"done"}
@@ -138,26 +139,33 @@ def test_an_interruption_goes_on_where_it_stopped(sessions, tmp_path):
         return len(done) > 2
 
     with pytest.raises(StoppedError):
-        fleet([sessions], "circles", tmp_path / "out", stop=stop, progress=lambda *told: done.append(told))
+        fleet(
+            [sessions],
+            "circles",
+            tmp_path / "out",
+            options=ONE_TEST,
+            stop=stop,
+            progress=lambda *told: done.append(told),
+        )
     kept = [path.name for path in (tmp_path / "out" / "circles").glob("*.json")]
     assert 0 < len(kept) < COUNT
-    again = states(fleet([sessions], "circles", tmp_path / "out"))
+    again = states(fleet([sessions], "circles", tmp_path / "out", options=ONE_TEST))
     assert sorted(again.values()) == ["done"] * (COUNT - len(kept)) + ["up-to-date"] * len(kept)
 
 
 @pytest.mark.usefixtures("here")
 def test_half_a_result_is_no_result(sessions, tmp_path):
-    fleet([sessions], "circles", tmp_path / "out")
+    fleet([sessions], "circles", tmp_path / "out", options=ONE_TEST)
     path = next((tmp_path / "out" / "circles").glob("m03-*.json"))
     path.write_text(path.read_text("utf-8")[:100], "utf-8")
-    assert states(fleet([sessions], "circles", tmp_path / "out"))["m03"] == "done"
+    assert states(fleet([sessions], "circles", tmp_path / "out", options=ONE_TEST))["m03"] == "done"
 
 
 @pytest.mark.usefixtures("here")
 def test_copies_are_done_once(sessions, tmp_path):
     shutil.copytree(sessions / "m00", sessions / "m00-copy")
     notes = []
-    result = fleet([sessions], "circles", tmp_path / "out", say=notes.append)
+    result = fleet([sessions], "circles", tmp_path / "out", options=ONE_TEST, say=notes.append)
     assert [one.session for one in result.sessions] == ["m00", "m01", "m02", "m03"]
     assert any("m00-copy is a copy of m00" in one for one in notes)
 
@@ -181,9 +189,10 @@ def test_a_machine_of_another_geometry_is_compared_in_figures_only_and_that_is_s
     assert figures["M03"] == COUNT - 1
 
 
+@pytest.mark.usefixtures("here")
 def test_reports_and_tables_as_parquet(sessions, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
-    words = ["fleet", sessions, "--task", "circles", "--out", tmp_path / "out"]
+    words = ["fleet", sessions, "--task", "circles", "--tests", "a", "--out", tmp_path / "out"]
     done = call(*words, "--table", tmp_path / "all.parquet")
     assert done.code == DONE, done.err
     # The CSV has nine digits.

@@ -12,9 +12,9 @@ from concurrent.futures import as_completed
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.computing.processes import processes
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.atomic import write_text
+from dbbstation.system.processes import processes
 from dbbstation.system.signals import starting
 from studies.diagnosed import diagnose_sessions
 from studies.memory import forget_largest_memory, largest_memory_mb

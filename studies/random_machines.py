@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, TypeVar
 
-from dbbstation.computing.processes import processes
+from dbbstation.system.processes import processes
 from dbbstation.system.signals import starting
 
 if TYPE_CHECKING:

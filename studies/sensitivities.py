@@ -8,7 +8,6 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.computing.processes import each
 from dbbstation.diagnosis.compare.comparison import compare
 from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.diagnosis.drive.identify import identify
@@ -20,6 +19,7 @@ from dbbstation.results.comparison import comparison_result
 from dbbstation.results.drive import drive_result
 from dbbstation.results.mismatch import mismatch_result
 from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.system.processes import each
 from dbbstation.tasks.diagnosed import default_candidates
 from dbbstation.tasks.load import load_sessions
 from dbbstation.tasks.tables import TableOptions, load_tables

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_runs, print_table
+from dbbstation.facts.digits import decimals_of, to_its_place
 from dbbstation.results.words import fit_sentences, outlier_sentence, residual_lines, use_sentence, visibility_sentences
 from dbbstation.tasks.calibrate import calibrate as task
-from dbbstation.text.written import decimals_of, to_its_place
 
 if TYPE_CHECKING:
     from dbbstation.calibration.checks.scatter import ScatterCheck

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_table
+from dbbstation.facts.digits import expanded_uncertainty, with_uncertainty
 from dbbstation.tasks.circles import circles as task
 from dbbstation.tasks.declare import Option
-from dbbstation.text.written import expanded_uncertainty, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

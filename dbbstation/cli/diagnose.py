@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 from dbbstation.cli.declared import CommandOutput, command, figure, save
 from dbbstation.cli.effects import SAID, cancelling_text, print_locations, probability_text
 from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_table, say
+from dbbstation.facts.digits import expanded_uncertainty, with_uncertainty
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.words import ending_sentences, mismatch_sentence, outlier_sentence
 from dbbstation.tasks.declare import Option
 from dbbstation.tasks.diagnose import diagnose as task
-from dbbstation.text.written import expanded_uncertainty, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,1 +1,1 @@
-"""Background threads, worker processes and BLAS thread limits."""
+"""Compiled loops, background threads and BLAS thread limits."""

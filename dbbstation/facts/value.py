@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, PlainSerializer
 
-from dbbstation.text.written import to_its_place
+from dbbstation.facts.digits import to_its_place
 
 OrUnknown = Annotated[
     float,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from dbbstation.facts.digits import to_its_place
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.event_log import anchor_of
 from dbbstation.report.certificate import sealed_after
-from dbbstation.text.written import to_its_place
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -8,6 +8,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from dbbstation.circles.budget import BudgetTerm
+from dbbstation.facts.digits import to_its_place
 from dbbstation.facts.serialise import as_objects
 from dbbstation.machine.geometry import differences, in_words
 from dbbstation.report.certificate import certified
@@ -28,7 +29,6 @@ from dbbstation.results.report_verdict import verdict_of
 from dbbstation.results.tolerances import tolerated_circles, tolerated_pairs
 from dbbstation.results.words import unseen_sentence, weak_sentence
 from dbbstation.sources.contract import Owner
-from dbbstation.text.written import to_its_place
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.facts.digits import decimals_of
 from dbbstation.report.history_words import DASH
 from dbbstation.report.html import environment
-from dbbstation.text.written import decimals_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import jinja2
 
 from dbbstation.errors import StationError
+from dbbstation.facts.digits import with_uncertainty
 from dbbstation.report.history_words import DASH, rounded
 from dbbstation.system.children import BoundExceededError, ProgramBounds, is_root, run_bounded
-from dbbstation.text.written import with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

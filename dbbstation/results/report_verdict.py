@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.facts.digits import expanded_uncertainty, with_uncertainty
 from dbbstation.facts.held import ReportVerdict
 from dbbstation.quality.conformity import Conformity
 from dbbstation.results.model_warnings import lacks_physics
 from dbbstation.results.words import evaluated_sentence
-from dbbstation.text.written import expanded_uncertainty, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

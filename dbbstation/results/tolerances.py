@@ -15,10 +15,10 @@ from dbbstation.circles.extremes import without_noise
 from dbbstation.circles.path import TOLERATED, Filter
 from dbbstation.computing.arrays import hypot_of, norm_of
 from dbbstation.facts import OfRunInSession, of_facts
+from dbbstation.facts.digits import expanded_uncertainty
 from dbbstation.facts.held import HeldTolerance, WorstCircle
 from dbbstation.plan.tolerance import FILTERED, OF_A_MODEL, OF_BOTH_DIRECTIONS, CircleFigure
 from dbbstation.quality.conformity import Conformity, Size, conformity
-from dbbstation.text.written import expanded_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

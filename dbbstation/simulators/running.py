@@ -12,12 +12,12 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from dbbstation.catalogue import FOREIGN, in_words, line_in
-from dbbstation.computing.processes import processes
 from dbbstation.diagnosis.simulator.contract import simulated
 from dbbstation.diagnosis.simulator.work import BudgetSpentError, told
 from dbbstation.errors import CalibrationError
 from dbbstation.simulators.kept import KeptSimulations
 from dbbstation.simulators.loading import know, simulator_of
+from dbbstation.system.processes import processes
 from dbbstation.system.signals import starting
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from dbbstation.computing.processes import processes
 from dbbstation.computing.threads import in_background
 from dbbstation.errors import StationError
 from dbbstation.files.keys import differences_of, program_identity
+from dbbstation.system.processes import processes
 from dbbstation.system.signals import starting
 
 if TYPE_CHECKING:

@@ -10,7 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from dbbstation.computing.processes import each
 from dbbstation.errors import InputError, StationError
 from dbbstation.facts.serialise import json_of, read_json
 from dbbstation.files.gateway import digest_of
@@ -24,6 +23,7 @@ from dbbstation.history.order import date_faults
 from dbbstation.history.record import ModelFigures, SessionFigures
 from dbbstation.history.trend import histories
 from dbbstation.results.history import history_result
+from dbbstation.system.processes import each
 from dbbstation.text.written import listed
 
 if TYPE_CHECKING:

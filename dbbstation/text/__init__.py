@@ -1,1 +1,1 @@
-"""Texts of causes, decimals of numbers, sorting, and safe output to a terminal."""
+"""Order of names, and safe output to a terminal."""

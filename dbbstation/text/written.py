@@ -1,8 +1,7 @@
-"""How names and numbers are written: in which order, with which digits, and without what would drive a terminal."""
+"""How names are written: in which order, and without what would drive a terminal."""
 
 from __future__ import annotations
 
-import math
 import re
 from collections import defaultdict
 from typing import TYPE_CHECKING, Protocol, TypeVar
@@ -55,53 +54,6 @@ def repeats_in_order(runs: Iterable[Run]) -> tuple[Run, ...]:
         alike[run.test, run.direction].append(run)
     next_of = {key: iter(sorted(repeats, key=lambda run: run.repeat)) for key, repeats in alike.items()}
     return tuple(next(next_of[run.test, run.direction]) for run in given)
-
-
-MOST_DECIMALS = 3
-"""Decimals of the finest figures, in µm: a nanometre."""
-
-SIGNIFICANT = 2
-"""Number of significant digits of an uncertainty."""
-
-
-def expanded_uncertainty(u: float | None, coverage_factor: float) -> float | None:
-    """Return U = k u; None if u is not known."""
-    return None if u is None else coverage_factor * u
-
-
-LONGEST = 6
-"""Number of decimals or rounded zeros above which a number has an exponent."""
-
-
-def decimals_of(expanded: float) -> int:
-    """Return the decimals of a value with this expanded uncertainty."""
-    return min(max(_place(expanded), 0), MOST_DECIMALS) if expanded > 0.0 else MOST_DECIMALS
-
-
-def _place(uncertainty: float) -> int:
-    """Return the decimal place of an uncertainty's last significant digit."""
-    shown = float(f"{uncertainty:.{SIGNIFICANT - 1}e}")  # 0.0996 is written as 0.10
-    return SIGNIFICANT - 1 - math.floor(math.log10(shown))
-
-
-def to_its_place(value: float, uncertainty: float) -> tuple[str, str]:
-    """Return a value and its uncertainty, rounded to two significant digits of the uncertainty [GUM 7.2.6]."""
-    if not (0.0 < uncertainty < math.inf and math.isfinite(value)):
-        return f"{value:.4g}", f"{uncertainty:.2g}"
-    place = _place(uncertainty)
-    if abs(place) <= LONGEST:
-        rounded = (round(value, place), round(uncertainty, place))
-        return f"{rounded[0]:z.{max(place, 0)}f}", f"{rounded[1]:.{max(place, 0)}f}"
-    digits = 0 if value == 0.0 else math.floor(math.log10(abs(value))) + place
-    return f"{value:z.{max(digits, 0)}e}", f"{uncertainty:.{SIGNIFICANT - 1}e}"
-
-
-def with_uncertainty(value: float, expanded: float | None) -> tuple[str, str]:
-    """Return a value and its expanded uncertainty as text with the same decimals."""
-    if expanded is None:
-        return f"{value:z.1f}", "-"
-    decimals = decimals_of(expanded)
-    return f"{value:z.{decimals}f}", f"{expanded:.{decimals}f}"
 
 
 _CONTROL = [*range(0x20), *range(0x7F, 0xA0)]

@@ -20,9 +20,9 @@ from scipy.optimize import brentq
 from scipy.stats import rice
 
 from dbbstation.cli import DONE, FAILED
+from dbbstation.facts.digits import with_uncertainty
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.run_csv import read_run
-from dbbstation.text.written import with_uncertainty
 from tests.cli.conftest import call
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import subset, table_ii_plan

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from dbbstation.computing.processes import each
 from dbbstation.files.places import shipped_folder
 from dbbstation.service.work import BackgroundWork, Call, WorkProgress
 from dbbstation.system.children import python_module
+from dbbstation.system.processes import each
 
 SMALL = shipped_folder("fixtures") / "sessions" / "small"
 

@@ -8,8 +8,8 @@ from decimal import ROUND_HALF_EVEN, Decimal
 import numpy as np
 import pytest
 
+from dbbstation.facts.digits import to_its_place
 from dbbstation.facts.value import Value
-from dbbstation.text.written import to_its_place
 
 
 @pytest.mark.parametrize(

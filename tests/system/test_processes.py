@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from dbbstation.computing.processes import each
+from dbbstation.system.processes import each
 
 PID = "__import__('os').getpid()"
 IN_CHILD = "__import__('multiprocessing').parent_process()"
@@ -53,7 +53,7 @@ def test_what_a_dead_process_leaves_is_worked_out_here():
 
 
 SLEEPS = """
-from dbbstation.computing.processes import each
+from dbbstation.system.processes import each
 if __name__ == "__main__":
     for place, process in each(eval, ["__import__('os').getpid()", "__import__('time').sleep(1000)"], 2):
         print(process, flush=True)

@@ -100,8 +100,13 @@ def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
         with alone(place):
             if not place.exists():
                 told: list[str] = []
+
+                def say(text: str) -> None:
+                    told.append(text)
+                    _told([text], None, more)
+
                 with input_book() as book:
-                    answer = task(*words, **{**more, **({"say": told.append} if tells else {})})
+                    answer = task(*words, **{**more, **({"say": say} if tells else {})})
                 read = dict(book._digests), book._read
                 _note_read(read)
                 try:
@@ -109,7 +114,8 @@ def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
                 except (AttributeError, TypeError, pickle.PicklingError):
                     place.unlink(missing_ok=True)
                     _HERE[place] = told, answer, read
-                    return _told(told, answer, more)
+                _note_files((*words, *wanted.values()))
+                return answer
         told, answer, read = pickle.loads(place.read_bytes())  # noqa: S301 - written above
         _note_read(read)
         _note_files((*words, *wanted.values()))

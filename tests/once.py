@@ -81,7 +81,7 @@ def computed_once(factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, *t
 
 
 _HERE: dict[Path, tuple[list[str], object, _Read]] = {}
-"""Answers that cannot be written down: each worker computes them."""
+"""Answers that cannot be written down, or cannot be read here: each worker computes them."""
 
 
 def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
@@ -98,7 +98,8 @@ def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
             _note_read(_HERE[place][2])
             return _told(*_HERE[place][:2], more)
         with alone(place):
-            if not place.exists():
+            kept = _kept_at(place)
+            if kept is None:
                 told: list[str] = []
 
                 def say(text: str) -> None:
@@ -107,22 +108,30 @@ def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
 
                 with input_book() as book:
                     answer = task(*words, **{**more, **({"say": say} if tells else {})})
-                read = dict(book._digests), book._read
-                _note_read(read)
+                kept = told, answer, (dict(book._digests), book._read)
+                more = {name: one for name, one in more.items() if name != "say"}  # it has been told
                 try:
-                    place.write_bytes(dumps((told, answer, read)))
+                    written = b"" if place.exists() else dumps(kept)  # what is there, this worker cannot read
                 except (AttributeError, TypeError, pickle.PicklingError):
-                    place.unlink(missing_ok=True)
-                    _HERE[place] = told, answer, read
-                _note_files((*words, *wanted.values()))
-                return answer
-        told, answer, read = pickle.loads(place.read_bytes())  # noqa: S301 - written above
-        _note_read(read)
+                    written = b""
+                if written:
+                    place.write_bytes(written)
+                else:
+                    _HERE[place] = kept
+        _note_read(kept[2])
         _note_files((*words, *wanted.values()))
-        return _told(told, answer, more)
+        return _told(*kept[:2], more)
 
     ask.kept_in = folder
     return ask
+
+
+def _kept_at(place: Path) -> tuple[list[str], object, _Read] | None:
+    """Answer that a worker wrote down; None without one, or if it names a file of sources that only that worker has loaded."""
+    try:
+        return pickle.loads(place.read_bytes())  # type: ignore[no-any-return]  # noqa: S301 - written above
+    except (FileNotFoundError, ImportError, AttributeError):
+        return None
 
 
 def _told(told: list[str], answer: object, more: dict[str, Any]) -> object:

@@ -279,14 +279,13 @@ def test_what_no_machine_has_is_refused_within_bounds(name):
     text, says = BOMBS[name]
     code = (
         "import sys; from dbbstation.nc.rs274.reader import read_program; from dbbstation.errors import InputError\n"
-        "import time; began = time.process_time()\n"
         "try: read_program(sys.stdin.read(), 'part.ngc')\n"
-        "except InputError as error: print(error)\n"
-        "assert time.process_time() - began < 2.0"
+        "except InputError as error: print(error)"
     )
 
     def bounded() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
+        resource.setrlimit(resource.RLIMIT_CPU, (20, 20))  # seconds, of which reading takes one: a bomb takes hours
 
     done = subprocess.run(
         [sys.executable, "-c", code],

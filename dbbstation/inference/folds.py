@@ -517,7 +517,7 @@ def chosen_anew(
             found[kind_of(name)] = found.get(kind_of(name), 0.0) + whole - _predicted(of_all, others, less)
         for wanted in classes:
             less = [m for m in chosen if not follow(m.name) & wanted]
-            found[wanted] = whole - _predicted(of_all, others, less)
+            found[wanted] = whole - _predicted(of_all, others, less) if len(less) < len(chosen) else 0.0
         parts.append(found)
         del others  # free the products before the next part needs as much memory
     return parts

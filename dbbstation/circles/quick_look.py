@@ -135,11 +135,11 @@ def quick_look(turns: Sequence[CircleAnalysis]) -> QuickLook | None:
     fit = _best(_fits(cut))
     waves = {axis: _cyclic(cut, fit, axis) for axis in ("X", "Y")}
     strongest, other = sorted(waves, key=lambda axis: waves[axis][1].gained, reverse=True)
-    shown = [wave.columns for symptom, wave in [waves[strongest]] if symptom.seen]
+    shown = [waves[strongest][1].columns] if waves[strongest][0].seen else []
     if shown:
         fit = _fitted(cut, fit.spike_deg, shown)
         waves[other] = _cyclic(cut, fit, other)
-        shown += [wave.columns for symptom, wave in [waves[other]] if symptom.seen]
+        shown += [waves[other][1].columns] if waves[other][0].seen else []
     fits = _fits(cut, shown)
     fit = _best(fits)
     sigma_um = _sigma_um(cut, fit)

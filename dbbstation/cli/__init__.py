@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation import __version__
-from dbbstation.cli.lazy import RENAMED, RENAMED_FLAGS, LazyGroup
+from dbbstation.cli.lazy import LazyGroup
 from dbbstation.cli.log import drop_output, drop_unwritable, flush_output, open_missing
 from dbbstation.cli.output import echo, say
 from dbbstation.cli.progress import Compiling
@@ -73,7 +73,6 @@ _MODULES = {
     table=COMMANDS,
     package="dbbstation.cli",
     modules=_MODULES,
-    renamed=RENAMED,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 @click.version_option(__version__, prog_name="dbbstation")
@@ -140,7 +139,7 @@ def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> No
         code = left.exit_code
     except click.ClickException as problem:
         told = io.StringIO()
-        _with_new_name(problem).show(told)
+        problem.show(told)
         echo(told.getvalue(), err=True, nl=False)
         code = problem.exit_code
     except (click.Abort, KeyboardInterrupt):
@@ -160,13 +159,6 @@ def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> No
         echo(f"{type(problem).__name__}: {problem}", err=True)
         echo(f"this is a fault of dbbstation itself; {_DEBUG} shows what to report", err=True)
     sys.exit(code)
-
-
-def _with_new_name(problem: click.ClickException) -> click.ClickException:
-    if not isinstance(problem, click.NoSuchOption) or problem.ctx is None:
-        return problem
-    now = RENAMED_FLAGS.get(f"{problem.ctx.info_name} {problem.option_name}")
-    return click.UsageError(f"No such option {problem.option_name!r}; it is now {now}", problem.ctx) if now else problem
 
 
 def _invoked(group: click.Group, context: click.Context) -> object:

@@ -17,48 +17,6 @@ if TYPE_CHECKING:
 
     from click import Context, Parameter
 
-RENAMED = {
-    "drive": "`identify`",
-    "emulate": "`instrument emulate`",
-    "instruments": "`instrument list`",
-    "monitor": "`instrument monitor`",
-    "plot": "`circles --figure`",
-    "ports": "`instrument ports`",
-    "replay": "`instrument replay`",
-    "station": "`measure`",
-    "study": "`python -m studies` in a checkout",
-}
-
-RENAMED_FLAGS = {
-    "bar --calibrator": "--calibrator-serial",
-    "bar --certificate": "--calibrator-certificate",
-    "bar --serial-number": "--bar-serial-number",
-    "circles --csv": "--table",
-    "compensate --angles": "--angles-deg",
-    "compensate --from": "--written-in",
-    "compensate --offset": "--offsets",
-    "compensate --tool-length": "--tool-lengths-mm",
-    "diagnose --keep-unexplained": "--out, which keeps it",
-    "export --state": "--states",
-    "fleet --do": "--task",
-    "history --csv": "--table",
-    "history --html": "--page",
-    "history --rebuild": "--anew",
-    "holders --column": "--columns",
-    "holders --before": "--jig",
-    "identify --out": "--table",
-    "mismatch --corrected": "--table",
-    "predict --out": "--table",
-    "predict --poses": "POSES without a flag",
-    "report --out": "--page",
-    "sheet --column": "--columns",
-    "sheet --before": "--jig",
-    "sheet --k": "--coverage",
-    "sheet --name": "--names",
-    "simulate --plan": "PLAN without a flag",
-}
-"""New names by command and flag; names that only gained an `s` are suggested anyway."""
-
 
 class Utf8(StringParamType):
     """A text in UTF-8; file names may hold any bytes."""
@@ -98,11 +56,10 @@ class LazyGroup(click.Group):
         table: Mapping[str, str],
         package: str,
         modules: Mapping[str, str] | None = None,
-        renamed: Mapping[str, str] | None = None,
         **more: Any,  # noqa: ANN401 - as click has it
     ) -> None:
         super().__init__(**more)
-        self._modules, self._renamed = modules or {}, renamed or {}
+        self._modules = modules or {}
         self._table = table
         self._package = package
 
@@ -124,8 +81,6 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command, or suggest similar ones."""
         name = args[0]
-        if name in self._renamed:
-            ctx.fail(f"No such command {name!r}; it is now {self._renamed[name]}")
         near = difflib.get_close_matches(name, self._table, n=3)
         if name not in self._table and not name.startswith("-") and near:
             ctx.fail(f"No such command {name!r}; did you mean {' or '.join(near)}?")

@@ -18,23 +18,6 @@ PATIENCE_S = 60
 
 
 @pytest.mark.parametrize(
-    ("former", "now"),
-    [
-        (["drive", "x.csv"], "it is now `identify`"),
-        (["ports"], "it is now `instrument ports`"),
-        (["history", "x", "--rebuild"], "--anew"),
-        (["predict", "--poses", "x.csv"], "POSES without a flag"),
-        (["circles", "x", "--test", "a"], "--tests"),
-        (["jig", "sheet", "x", "--k", "2"], "--coverage"),
-    ],
-)
-def test_a_former_name_is_answered_with_the_new_one(run, former, now):
-    outcome = run(*former)
-    assert outcome.code == USAGE
-    assert now in outcome.err
-
-
-@pytest.mark.parametrize(
     "arguments",
     [
         ["calibrat"],
@@ -55,8 +38,9 @@ def test_a_command_line_that_is_not_understood(run, arguments):
     assert "Error: " in outcome.err
 
 
-def test_the_nearest_command_is_named(run):
+def test_the_nearest_command_and_flag_are_named(run):
     assert "did you mean calibrate?" in run("calibrat").err
+    assert "--tests" in run("circles", "x", "--test", "a").err
 
 
 @pytest.fixture

@@ -57,12 +57,6 @@ def test_it_knows_its_instruments(installed, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_it_says_where_the_studies_are(installed, tmp_path):
-    done = run(installed, tmp_path, "dbbstation", "study", "coverage")
-    assert done.returncode == 2
-    assert done.stderr.endswith("No such command 'study'; it is now `python -m studies` in a checkout\n")
-
-
 EVERYTHING = """
 import importlib, pkgutil, dbbstation
 for module in pkgutil.walk_packages(dbbstation.__path__, "dbbstation."):

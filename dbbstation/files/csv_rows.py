@@ -11,7 +11,7 @@ from dbbstation.files.formats.number_language import is_number
 from dbbstation.text.written import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
 
 _BEGINS_FORMULA = frozenset("=+-@\t\n＝＋－＠")
@@ -35,6 +35,12 @@ def csv_text(rows: Iterable[Iterable[object]], *, exact: bool = False) -> str:
     out = io.StringIO(newline="")
     csv.writer(out, lineterminator="\n").writerows((_guarded(cell, exact=exact) for cell in row) for row in rows)
     return out.getvalue()
+
+
+def table_csv(names: Sequence[str], columns: Sequence[Sequence[object]]) -> str:
+    """Return columns as CSV text; numbers with nine significant digits."""
+    rows = ([f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row] for row in zip(*columns, strict=True))
+    return csv_text([names, *rows])
 
 
 def _guarded(cell: object, *, exact: bool) -> object:

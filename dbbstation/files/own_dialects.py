@@ -6,10 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem, refuse
-from dbbstation.files.own_classes import classes_in_files
 from dbbstation.nc.dialect import Dialect
 from dbbstation.nc.registry import dialect_named
-from dbbstation.nc.trial import faults_of
 
 if TYPE_CHECKING:
     from dbbstation.catalogue import FoundClass
@@ -29,6 +27,8 @@ def dialect_given(name_or_file: str) -> Dialect:
     """
     if not name_or_file.endswith(".py"):
         return dialect_named(name_or_file)
+    from dbbstation.files.own_classes import classes_in_files  # noqa: PLC0415 - most dialects are the package's
+
     faults: list[Problem] = []
     found = classes_in_files([Path(name_or_file)], Dialect, CONTRACT, faults)  # never made
     if len(found) > 1:
@@ -39,6 +39,8 @@ def dialect_given(name_or_file: str) -> Dialect:
 
 
 def _tried(found: FoundClass[Dialect]) -> Dialect:
+    from dbbstation.nc.trial import faults_of  # noqa: PLC0415 - the same
+
     kind = found.kind
     said = [f"it needs `{name}`, a text" for name in DECLARED if not isinstance(getattr(kind, name, None), str)]
     if not said and not kind.extension.startswith("."):

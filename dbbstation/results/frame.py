@@ -15,7 +15,6 @@ from dbbstation.errors import ArgumentError, OutputError, StationError
 from dbbstation.facts.serialise import AsItIs, Kept, json_of, plain
 from dbbstation.files.atomic import write_bytes
 from dbbstation.files.provenance import Provenance, from_python, write_table
-from dbbstation.files.recordings.table_csv import table_csv
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -127,6 +126,8 @@ class Framed:
         self._save(Path(path), provenance(), force=force)
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
+        from dbbstation.files.csv_rows import table_csv  # noqa: PLC0415 - few results are saved as tables
+
         rows = self.rows()
         names = _columns(rows)
         columns = [["" if row.get(name) is None else row[name] for row in rows] for name in names]

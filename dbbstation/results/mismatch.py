@@ -15,8 +15,8 @@ from dbbstation.diagnosis.table.words import sentence_of
 from dbbstation.facts import of_facts, picked
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value, finite
+from dbbstation.files.csv_rows import table_csv
 from dbbstation.files.provenance import Provenance, write_table
-from dbbstation.files.recordings.table_csv import table_csv
 from dbbstation.inference.alternatives import Cancelling
 from dbbstation.inference.folds import Fold
 from dbbstation.inference.left_over import LeftOver

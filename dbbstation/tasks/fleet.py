@@ -12,6 +12,7 @@ from dbbstation.errors import OutputError, StationError
 from dbbstation.facts import of_facts
 from dbbstation.facts.serialise import read_plain
 from dbbstation.files.atomic import streamed, write_bytes
+from dbbstation.files.csv_rows import table_csv
 from dbbstation.files.fleet_folder import FleetFolder
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book, note_known
@@ -20,7 +21,6 @@ from dbbstation.files.places import SESSION_FILE, real_path, text_of_name
 from dbbstation.files.provenance import from_python, write_table
 from dbbstation.files.recordings.former import files_of, reason_of
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.recordings.table_csv import table_csv
 from dbbstation.report.fleet_page import fleet_html
 from dbbstation.results.fleet import TABLE, FleetFound, FleetResult, FleetSession, StoredFiles
 from dbbstation.sisters.unlike import FALSE_ALARMS

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.simulator.answer import find
 from dbbstation.diagnosis.simulator.model import SimulationRequest
-from dbbstation.files.recordings.table_csv import table_csv
+from dbbstation.files.csv_rows import table_csv
 from dbbstation.results.simulator import SimulationsRun, simulator_result
 from dbbstation.simulators.code import missing_code
 from dbbstation.simulators.running import MOST_SECONDS, Runs

@@ -12,7 +12,7 @@ import numpy as np
 
 from dbbstation.catalogue import meant
 from dbbstation.errors import MOST_FAULTS, Faults, InputError, Problem, refuse
-from dbbstation.files.csv_rows import csv_cells, csv_text
+from dbbstation.files.csv_rows import csv_cells
 from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
 from dbbstation.files.source_text import LARGEST_TABLE, numbered_lines, shortened, text_of
 
@@ -193,12 +193,6 @@ def missing_column(name: str, names: Sequence[str], file: str, line: int) -> Pro
     """Return the fault of a missing column, and name likely columns."""
     remedy = meant(name, names, f"columns here: {', '.join(names)}", likeness=0.5)
     return Problem(file, line, 0, f"there is no column `{name}`", remedy)
-
-
-def table_csv(names: Sequence[str], columns: Sequence[Sequence[object]]) -> str:
-    """Return columns as CSV text; numbers with nine significant digits."""
-    rows = ([f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row] for row in zip(*columns, strict=True))
-    return csv_text([names, *rows])
 
 
 def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: int) -> Faults:

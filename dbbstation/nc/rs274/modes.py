@@ -10,7 +10,6 @@ import numpy as np
 
 from dbbstation.nc.rs274.arcs import CENTRES
 from dbbstation.nc.rs274.blocks import CURVES, CYCLES, NEEDED, STORED, ModalGroup, name
-from dbbstation.nc.rs274.cutter import Beside, Cutter
 from dbbstation.nc.rs274.cycles import ModalCycle
 from dbbstation.nc.rs274.flow import Flow
 from dbbstation.nc.rs274.state import AXES, ControlState
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.nc.rs274.blocks import ProgramBlock
+    from dbbstation.nc.rs274.cutter import Beside, Cutter
     from dbbstation.nc.rs274.tokens import BadLine, Place, Word
     from dbbstation.nc.setup import ControlSetup
 
@@ -318,6 +318,8 @@ class Modes:
         radius_mm = self._diameter_mm(block, word, number) / 2.0
         self._left_contour = False
         if radius_mm != 0.0:
+            from dbbstation.nc.rs274.cutter import Cutter  # noqa: PLC0415 - most programs name no side of a contour
+
             self._cutter = Cutter(1 if is_left == (radius_mm > 0.0) else -1, abs(radius_mm))
 
     def _diameter_mm(self, block: ProgramBlock, word: Word, number: Word | None) -> float:

@@ -10,7 +10,6 @@ import numpy as np
 
 from dbbstation.nc.rs274.arcs import CENTRES, Arc, arc_of, curve_of
 from dbbstation.nc.rs274.blocks import CURVES, CYCLES, TAPS, ModalGroup, name
-from dbbstation.nc.rs274.cutter import Beside, NoRoomError, element_of, with_plane
 from dbbstation.nc.rs274.cycles import cycle_steps
 from dbbstation.nc.rs274.state import AXES, unknown_place, unplaced
 from dbbstation.nc.toolpath import (
@@ -117,6 +116,8 @@ class Moves(Modes):
             del block.words[letter]
 
     def _go_beside(self, cutter: Cutter, block: ProgramBlock, target: Floats) -> None:
+        from dbbstation.nc.rs274.cutter import NoRoomError, element_of, with_plane  # noqa: PLC0415 - as for `Cutter`
+
         arc = self._arc(block, target) if self._motion in ARCS else None
         if self._motion != RAPID:
             self._check_feed(block)
@@ -138,6 +139,8 @@ class Moves(Modes):
         self._state.pose = target
 
     def _along(self, cutter: Cutter, element: Element, arc: Arc | None, block: ProgramBlock, target: Floats) -> None:
+        from dbbstation.nc.rs274.cutter import Beside, with_plane  # noqa: PLC0415 - the same
+
         plane, last = PLANES[self._plane], self._beside
         if last is None:
             element = cutter.entered(element, element.begin) if arc else element

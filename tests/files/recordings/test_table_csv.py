@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import InputError
-from dbbstation.files.recordings.table_csv import parse_table, table_csv
+from dbbstation.files.csv_rows import table_csv
+from dbbstation.files.recordings.table_csv import parse_table
 
 
 def test_comments_separators_and_quotes():

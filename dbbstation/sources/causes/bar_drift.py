@@ -4,24 +4,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.sources.contract import MM_PER_UM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+import numpy as np
+
+from dbbstation.sources.contract import MM_PER_UM, Effect, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.temperature import (
     EQUATION,
     LOGGED_EQUATION,
     ORIGIN,
     FollowsTemperature,
     InTwoStages,
-    grown,
-    grown_by,
-    warm_up_parameters,
+    WarmsUp,
 )
 
 if TYPE_CHECKING:
-    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 
-class BarDrift(ErrorSource):
+class BarDrift(WarmsUp):
     """The bar's reading drifts with its body's temperature, by `laws.temperature`.
 
     The drift is zero at the session's first sample, because earlier errors are the bar's offset. Sessions with one bar share its values.
@@ -29,9 +28,10 @@ class BarDrift(ErrorSource):
 
     name = "bar-drift"
     belongs_to = Owner.INSTRUMENT
-    needs = frozenset({Need.TIME})
-    varies_with = "time"
-    form_uncertainty = 0.2  # a warm-up has its own law, in stages
+    growth = Parameter(
+        "drift_um", "µm", 2.0, "reading minus true distance, from the first sample to the end of warm-up"
+    )
+    usual_s = 1800.0
     texts = Texts(
         what="The bar itself changes its length while it warms up or cools down after having been handled. The drift "
         "given is counted from the first sample of the session.",
@@ -45,23 +45,8 @@ class BarDrift(ErrorSource):
         origin=ORIGIN,
     )
 
-    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        meaning = "reading minus true distance, from the first sample to the end of warm-up"
-        return warm_up_parameters(Parameter("drift_um", "µm", 2.0, meaning), "pause_loss_um", 1800.0)
-
-    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        self.require(motion)
-        return Effect(reading_mm=MM_PER_UM * grown(motion, values))
-
-    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        self.require(motion)
-        return Effect(reading_mm=MM_PER_UM * grown_by(motion, values))
-
-    def by_temperature(self) -> ErrorSource:
-        return _ByTemperature()
-
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return (_InTwoStages(), *super().other_laws())
+    def per_growth(self, motion: Motion, machine: Machine) -> Effect:  # noqa: ARG002
+        return Effect(reading_mm=np.array(MM_PER_UM))
 
 
 class _InTwoStages(InTwoStages, cause=BarDrift):
@@ -73,6 +58,3 @@ class _ByTemperature(FollowsTemperature, cause=BarDrift):
 
     thermometers = (("bar",),)
     growth = Parameter("drift_um_k", "µm/K", 1.6, "drift of the reading for each kelvin that the bar is warmer")
-
-    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        return Effect(reading_mm=MM_PER_UM * self.warmer_k(motion))

@@ -11,9 +11,7 @@ from dbbstation.sources.contract import (
     SMOOTH_MM,
     CForm,
     Effect,
-    ErrorSource,
     Motion,
-    Need,
     Owner,
     Parameter,
     Texts,
@@ -25,9 +23,7 @@ from dbbstation.sources.laws.temperature import (
     ORIGIN,
     FollowsTemperature,
     InTwoStages,
-    grown,
-    grown_by,
-    warm_up_parameters,
+    WarmsUp,
 )
 
 if TYPE_CHECKING:
@@ -43,7 +39,7 @@ _OUT_OF_THE_SPINDLE = np.array([0.0, 0.0, -1.0])
 """Direction of the tool tip's motion, platform frame: away from the platform above it [1]."""
 
 
-class SpindleGrowth(ErrorSource):
+class SpindleGrowth(WarmsUp):
     """The tool tip moves along the spindle by g(t) of `laws.temperature` plus earlier growth.
 
     Earlier growth is a share b of the remaining growth a; a warm spindle that cools has b = -1. Upright level circles
@@ -53,9 +49,8 @@ class SpindleGrowth(ErrorSource):
     name = "spindle-growth"
     belongs_to = Owner.MACHINE
     detail_mm = SMOOTH_MM
-    needs = frozenset({Need.TIME})
-    varies_with = "time"
-    form_uncertainty = 0.2  # a warm-up has its own law, in stages
+    growth = Parameter("growth_um", "µm", 10.0, "way of the tool tip out of the spindle, from the first sample on")
+    usual_s = 1800.0
     texts = Texts(
         what="The spindle and its nose warm up and push the tool out of the platform. The growth given is counted from "
         "the first sample of the session; begun says how much of it was there already, against the cold spindle.",
@@ -69,31 +64,23 @@ class SpindleGrowth(ErrorSource):
         origin=f"thermal distortion caused by a rotating spindle, ISO 230-3; {ORIGIN}",
     )
 
-    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        growth = Parameter("growth_um", "µm", 10.0, "way of the tool tip out of the spindle, from the first sample on")
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         before = "growth before the first sample, of that after it; -100 where a warm spindle cools"
         begun = Parameter("begun_percent", "percent", 40.0, before, BEGUN_PERCENT, newer=True)
-        return (*warm_up_parameters(growth, "pause_loss_um", 1800.0), begun)
+        return (*super().parameters(machine), begun)
 
-    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        self.require(motion)
-        growth, *_, percent = values
-        out_um = grown(motion, values[:-1]) + percent / 100.0 * growth
-        return Effect(tool_tip_mm=MM_PER_UM * out_um[:, None] * _OUT_OF_THE_SPINDLE)
+    def per_growth(self, motion: Motion, machine: Machine) -> Effect:  # noqa: ARG002
+        return Effect(tool_tip_mm=MM_PER_UM * _OUT_OF_THE_SPINDLE)
 
-    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        self.require(motion)
+    def grown(self, motion: Motion, values: Floats) -> Floats:
         growth, *_, percent = values
-        law = grown_by(motion, values[:-1])
+        return super().grown(motion, values[:-1]) + percent / 100.0 * growth
+
+    def grown_by(self, motion: Motion, values: Floats) -> Floats:
+        growth, *_, percent = values
+        law = super().grown_by(motion, values[:-1])
         law[:, 0] += percent / 100.0
-        by = MM_PER_UM * np.column_stack([law, np.full(len(law), growth / 100.0)])
-        return Effect(tool_tip_mm=_OUT_OF_THE_SPINDLE[:, None] * by[:, None, :])
-
-    def by_temperature(self) -> ErrorSource:
-        return _ByTemperature()
-
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return (_InTwoStages(), *super().other_laws())
+        return np.column_stack([law, np.full(len(law), growth / 100.0)])
 
 
 class _InTwoStages(InTwoStages, cause=SpindleGrowth):
@@ -107,9 +94,6 @@ class _ByTemperature(FollowsTemperature, cause=SpindleGrowth):
     growth = Parameter(
         "growth_um_k", "µm/K", 3.0, "way of the tool tip out of the spindle for each kelvin of the machine"
     )
-
-    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        return Effect(tool_tip_mm=(MM_PER_UM * self.warmer_k(motion) * _OUT_OF_THE_SPINDLE)[..., None])
 
     def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         body = "e->tip[2] -= 1e-3 * v[0] * warmer[thermometer[0]];"

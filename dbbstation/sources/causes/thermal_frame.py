@@ -9,9 +9,7 @@ from dbbstation.sources.contract import (
     SMOOTH_MM,
     CForm,
     Effect,
-    ErrorSource,
     Motion,
-    Need,
     Owner,
     Parameter,
     Texts,
@@ -24,9 +22,7 @@ from dbbstation.sources.laws.temperature import (
     STEEL_UM_M_K,
     FollowsTemperature,
     InTwoStages,
-    grown,
-    grown_by,
-    warm_up_parameters,
+    WarmsUp,
 )
 
 if TYPE_CHECKING:
@@ -36,7 +32,7 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
 
 
-class ThermalFrame(ErrorSource):
+class ThermalFrame(WarmsUp):
     """Base joints move from the plate's centre: dQ_i = Q_i g(t), g of `laws.temperature`.
 
     The plate's temperature is uniform, and it is fixed at the machine frame's origin; another fixed point only shifts
@@ -46,9 +42,8 @@ class ThermalFrame(ErrorSource):
     name = "thermal-frame"
     belongs_to = Owner.MACHINE
     detail_mm = SMOOTH_MM
-    needs = frozenset({Need.TIME})
-    varies_with = "time"
-    form_uncertainty = 0.2  # a warm-up has its own law, in stages
+    growth = Parameter("growth_um_m", "µm/m", 15.0, "growth of the base from the first sample to the end of warm-up")
+    usual_s = 7200.0
     texts = Texts(
         what="The base plate that carries the struts warms up while the machine works, or with the shop, and grows. The "
         "growth given is counted from the first sample of the session.",
@@ -62,24 +57,8 @@ class ThermalFrame(ErrorSource):
         origin=ORIGIN,
     )
 
-    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        meaning = "growth of the base from the first sample to the end of warm-up"
-        return warm_up_parameters(Parameter("growth_um_m", "µm/m", 15.0, meaning), "pause_loss_um_m", 7200.0)
-
-    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        self.require(motion)
-        return Effect(base_joint_mm=grown(motion, values)[:, None, None] * _per_growth_mm(machine))
-
-    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        self.require(motion)
-        law = grown_by(motion, values)
-        return Effect(base_joint_mm=_per_growth_mm(machine)[:, :, None] * law[:, None, None, :])
-
-    def by_temperature(self) -> ErrorSource:
-        return _ByTemperature()
-
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return (_InTwoStages(), *super().other_laws())
+    def per_growth(self, motion: Motion, machine: Machine) -> Effect:  # noqa: ARG002
+        return Effect(base_joint_mm=MM_PER_UM_M * machine.hexapod.base_joints_mm)
 
 
 class _InTwoStages(InTwoStages, cause=ThermalFrame):
@@ -94,13 +73,6 @@ class _ByTemperature(FollowsTemperature, cause=ThermalFrame):
         "growth_um_m_k", "µm/(m K)", STEEL_UM_M_K, "growth of the base for each kelvin that it is warmer"
     )
 
-    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        return Effect(base_joint_mm=(self.warmer_k(motion)[:, :, None] * _per_growth_mm(machine))[..., None])
-
     def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         body = "ALL e->base[i][k] += 1e-6 * v[0] * warmer[thermometer[0]] * Q[i][k];"
         return CForm(body, by_pose=False, thermometers=self.chosen(thermometers))
-
-
-def _per_growth_mm(machine: Machine) -> Floats:
-    return MM_PER_UM_M * machine.hexapod.base_joints_mm

@@ -10,7 +10,6 @@ from dbbstation.sources.contract import (
     SMOOTH_MM,
     CForm,
     Effect,
-    ErrorSource,
     Motion,
     Need,
     Owner,
@@ -25,9 +24,7 @@ from dbbstation.sources.laws.temperature import (
     STEEL_UM_M_K,
     FollowsTemperature,
     InTwoStages,
-    grown,
-    grown_by,
-    warm_up_parameters,
+    WarmsUp,
 )
 
 if TYPE_CHECKING:
@@ -37,7 +34,7 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
 
 
-class ThermalStruts(ErrorSource):
+class ThermalStruts(WarmsUp):
     """All struts grow in proportion to length: dL_i = L_i g(t), g of `laws.temperature`.
 
     Growth counts from the session's first sample; earlier growth is part of the reference lengths. Cold and warm starts
@@ -48,8 +45,8 @@ class ThermalStruts(ErrorSource):
     belongs_to = Owner.MACHINE
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.TIME})
-    varies_with = "time"
-    form_uncertainty = 0.2  # a warm-up has its own law, in stages
+    growth = Parameter("growth_um_m", "µm/m", 30.0, "growth of all struts from the first sample to the end of warm-up")
+    usual_s = 3600.0
     texts = Texts(
         what="The struts' screws warm up while the machine works and grow, quickly at first and then ever more slowly. "
         "The growth given is counted from the first sample of the session.",
@@ -63,27 +60,8 @@ class ThermalStruts(ErrorSource):
         origin=ORIGIN,
     )
 
-    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        meaning = "growth of all struts from the first sample to the end of warm-up"
-        return warm_up_parameters(Parameter("growth_um_m", "µm/m", 30.0, meaning), "pause_loss_um_m", 3600.0)
-
-    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        per_growth = self._per_growth_mm(motion, machine)
-        return Effect(strut_mm=grown(motion, values)[:, None] * per_growth)
-
-    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        per_growth = self._per_growth_mm(motion, machine)
-        return Effect(strut_mm=per_growth[:, :, None] * grown_by(motion, values)[:, None, :])
-
-    def by_temperature(self) -> ErrorSource:
-        return _ByTemperature()
-
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return (_InTwoStages(), *super().other_laws())
-
-    def _per_growth_mm(self, motion: Motion, machine: Machine) -> Floats:
-        self.require(motion)
-        return _per_growth_mm(motion, machine)
+    def per_growth(self, motion: Motion, machine: Machine) -> Effect:
+        return Effect(strut_mm=_per_growth_mm(motion, machine))
 
 
 class _InTwoStages(InTwoStages, cause=ThermalStruts):

@@ -25,7 +25,7 @@ import numpy as np
 
 from dbbstation.errors import ModelError
 from dbbstation.laws.memory import warmed, warmed_by_constant
-from dbbstation.sources.contract import Effect, ErrorSource, LinearSource, Motion, Need, Parameter
+from dbbstation.sources.contract import EFFECT_SHAPES, Effect, ErrorSource, LinearSource, Motion, Need, Parameter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -57,14 +57,17 @@ class FollowsTemperature(LinearSource):
     thermometers: ClassVar[tuple[tuple[str, ...], ...]]
     """Columns without unit, best choice first: one for the whole part, or one per strut."""
 
-    def __init_subclass__(cls, cause: type[ErrorSource]) -> None:
+    _of: ClassVar[WarmsUp]
+
+    def __init_subclass__(cls, cause: type[WarmsUp]) -> None:
         super().__init_subclass__()
         cls.name, cls.belongs_to, cls.texts = cause.name, cause.belongs_to, cause.texts
         cls.detail_mm = cause.detail_mm
+        cls._of, cause.logged = cause(), cls
 
-    @abstractmethod
-    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        """Return the derivative by the growth per kelvin, from `warmer_k`."""
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
+        warmer_k = self.warmer_k(motion)
+        return _times(self._of.per_growth(motion, machine), warmer_k)
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         return (self.growth,)
@@ -182,16 +185,64 @@ FASTER = 0.5
 constant, ratios of 0.3 to 0.6 err by at most 2.2 % of growth, 0.5 by 1.2 %; one body errs by 7 to 11 %."""
 
 
-def warm_up_parameters(growth: Parameter, pause_loss: str, usual_s: float) -> tuple[Parameter, ...]:
-    """Return the law's parameters: growth, time constant, pause loss."""
-    meaning = "what a pause without end would take back; pauses count from ten minutes on"
-    return (
-        growth,
-        Parameter(
-            "time_constant_s", "s", usual_s, "time in which it comes to 63 % of what it will be", TIME_CONSTANTS_S
-        ),
-        replace(growth, name=pause_loss, meaning=meaning, newer=True),
-    )
+class WarmsUp(ErrorSource):
+    """A cause in proportion to a growth g(t) over a session. Its module declares the laws `logged` and `staged`."""
+
+    needs = frozenset({Need.TIME})
+    varies_with = "time"
+    form_uncertainty = 0.2  # a warm-up has its own law, in stages
+    growth: ClassVar[Parameter]
+    """Growth from the first sample to the end of the warm-up."""
+    usual_s: ClassVar[float]
+    """Usual time constant."""
+    logged: ClassVar[type[FollowsTemperature]]
+    staged: ClassVar[type[InTwoStages]]
+
+    @abstractmethod
+    def per_growth(self, motion: Motion, machine: Machine) -> Effect:
+        """Return the effect of a growth of 1 in the unit of the parameters, without an axis of parameters."""
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        reached = "time in which it comes to 63 % of what it will be"
+        lost = "what a pause without end would take back; pauses count from ten minutes on"
+        pause_loss = f"pause_loss_{self.growth.name.split('_', 1)[1]}"
+        return (
+            self.growth,
+            Parameter("time_constant_s", "s", self.usual_s, reached, TIME_CONSTANTS_S),
+            replace(self.growth, name=pause_loss, meaning=lost, newer=True),
+        )
+
+    def grown(self, motion: Motion, values: Floats) -> Floats:
+        """Return the growth at every sample, shape (n,)."""
+        return grown(motion, values)
+
+    def grown_by(self, motion: Motion, values: Floats) -> Floats:
+        """Return derivatives of `grown` by the parameters, shape (n, p)."""
+        return grown_by(motion, values)
+
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
+        self.require(motion)
+        return _times(self.per_growth(motion, machine), self.grown(motion, values))
+
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
+        self.require(motion)
+        return _times(self.per_growth(motion, machine), self.grown_by(motion, values))
+
+    def by_temperature(self) -> ErrorSource:
+        return self.logged()
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        return (self.staged(), *super().other_laws())
+
+
+def _times(per: Effect, growth: Floats) -> Effect:
+    """Return the effect of growths, shape (n,), or of columns of them, (n, p), which become the last axis."""
+    found = {}
+    for name, axes in EFFECT_SHAPES.items():
+        if (each := getattr(per, name)) is not None:
+            wide = growth.reshape(len(growth), *(1 for _ in axes), *growth.shape[1:])
+            found[name] = wide * (each if growth.ndim == 1 else np.asarray(each)[..., None])
+    return Effect(**found)
 
 
 class InTwoStages(ErrorSource):
@@ -204,11 +255,11 @@ class InTwoStages(ErrorSource):
     form_uncertainty = 0.1  # heat varies between runs, and more than two bodies warm up
     _one: ClassVar[ErrorSource]
 
-    def __init_subclass__(cls, cause: type[ErrorSource]) -> None:
+    def __init_subclass__(cls, cause: type[WarmsUp]) -> None:
         super().__init_subclass__()
         cls.name, cls.belongs_to, cls.texts = cause.name, cause.belongs_to, cause.texts
         cls.needs, cls.varies_with, cls.detail_mm = cause.needs, cause.varies_with, cause.detail_mm
-        cls._one = cause()
+        cls._one, cause.staged = cause(), cls
 
     @property
     def law(self) -> str:

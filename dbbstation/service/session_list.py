@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import InputError
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.gateway import head_of
-from dbbstation.files.places import shipped_folder
-from dbbstation.files.recordings.former import dated_folders
+from dbbstation.files.places import SESSION_FILE, shipped_folder
+from dbbstation.files.recordings.former import DEPTH, dated_folders, folders_in
 from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.plan import circles_s
 from dbbstation.station.schedule import Schedule
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable
     from pathlib import Path
 
 
@@ -82,9 +82,6 @@ class CandidateFormat(StrEnum):
     MODEL = "dbb-model/"
 
 
-DEPTH = 2
-"""Depth of folders below the working folder that are searched."""
-
 _HEAD = 4096
 """Number of bytes at a file's begin that contain its format, behind the comments at its top."""
 
@@ -97,26 +94,13 @@ _SHIPPED = {
 
 def candidates(kind: CandidateFormat, under: Path, *, shipped: bool = True) -> tuple[Path, ...]:
     """Return the files of a format, first those in a folder; copies in sessions are left out."""
-    own = [path for path in _files(under, DEPTH) if _is(kind, path)]
+    outside = (inside for folder, inside in folders_in(under, DEPTH) if folder / SESSION_FILE not in inside)
+    own = [path for inside in outside for path in inside if path.suffix in {".yaml", ".yml"} and _is(kind, path)]
     if not shipped or kind not in _SHIPPED:
         return tuple(own)
     folder, pattern = _SHIPPED[kind]
     of_package = [path for path in sorted(shipped_folder(folder).glob(pattern)) if path not in own]
     return (*own, *of_package)
-
-
-def _files(folder: Path, depth: int) -> Iterator[Path]:
-    try:
-        inside = sorted(folder.iterdir())
-    except OSError:
-        return
-    if any(path.name == "session.yaml" for path in inside):
-        return
-    yield from (path for path in inside if path.suffix in {".yaml", ".yml"} and path.is_file())
-    if depth:
-        for path in inside:
-            if path.is_dir() and not path.name.startswith("."):
-                yield from _files(path, depth - 1)
 
 
 def _is(kind: CandidateFormat, path: Path) -> bool:

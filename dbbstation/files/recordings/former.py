@@ -55,7 +55,8 @@ def former_sessions(
 
 def dated_folders(under: Path, remembered: Iterable[Path] = ()) -> list[tuple[float, Path]]:
     """Return session folders with their files' times [s since 1970]; arguments as of `list_sessions`."""
-    folders = {folder.absolute() for folder in (*_found(under, DEPTH), *remembered)}
+    found = (folder for folder, inside in folders_in(under, DEPTH) if folder / SESSION_FILE in inside)
+    folders = {folder.absolute() for folder in (*found, *remembered)}
     dated = []
     for folder in folders:
         try:
@@ -66,17 +67,17 @@ def dated_folders(under: Path, remembered: Iterable[Path] = ()) -> list[tuple[fl
     return dated[:MOST]
 
 
-def _found(folder: Path, depth: int) -> Iterator[Path]:
+def folders_in(under: Path, depth: int) -> Iterator[tuple[Path, list[Path]]]:
+    """Return readable folders with their sorted content, but none below a session or with a name that begins with a dot."""
     try:
-        inside = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
-        is_session = (folder / SESSION_FILE).is_file()
+        inside = sorted(under.iterdir())
     except OSError:
         return
-    if is_session:
-        yield folder
-    elif depth:
+    yield under, inside
+    if depth and under / SESSION_FILE not in inside:
         for path in inside:
-            yield from _found(path, depth - 1)
+            if path.is_dir() and not path.name.startswith("."):
+                yield from folders_in(path, depth - 1)
 
 
 def _alike(now: SessionFolder, then: SessionFolder, tests: set[str]) -> bool:

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from dbbstation.errors import InputError, InstrumentError, StationError
 from dbbstation.facts.quantities import USUAL_STROKE_MM, Quantity
 from dbbstation.files.formats.bar import AFTER_MISREAD, BarFile, CalibratorSchema, write_bar
-from dbbstation.plan.bar import STEEL_BAR_UM_M_K, USUAL_READINGS, USUAL_TEMP_UNCERTAINTY_K
+from dbbstation.plan.bar import USUAL_READINGS
 from dbbstation.trace.reachable import Reachable
 from dbbstation.trace.steady import steady
 
@@ -101,19 +101,6 @@ _TICK_S = 0.05
 
 
 @dataclass(frozen=True)
-class Stated:
-    """Facts of bar and calibrator that the operator states."""
-
-    serial_number: str
-    calibrator: str
-    calibrator_mm: float
-    calibrator_u_um: float
-    certified: str
-    temp_c: float
-    valid_until: str = ""
-
-
-@dataclass(frozen=True)
 class Calibrated:
     """Result of the calibration.
 
@@ -142,7 +129,7 @@ class BarCalibration:
         self.failure: StationError | None = None
         self.found: Calibrated | None = None
         self.done = 0
-        self._wanted: tuple[Stated, Path] | None = None
+        self._wanted: tuple[Mapping[str, object], Mapping[str, object], Path] | None = None
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bar", daemon=True)
         self._thread.start()
@@ -152,11 +139,11 @@ class BarCalibration:
         """Return whether readings are being averaged."""
         return self._wanted is not None and self._thread.is_alive()
 
-    def begin(self, stated: Stated, path: Path) -> None:
-        """Average readings and write the file, unless busy."""
+    def begin(self, of_bar: Mapping[str, object], calibrator: Mapping[str, object], path: Path) -> None:
+        """Average readings and write the file with stated facts as of `bar_file`, unless busy."""
         if not self.busy:
             self.failure, self.found, self.done = None, None, 0
-            self._wanted = stated, path
+            self._wanted = of_bar, calibrator, path
             if not self._thread.is_alive():
                 self._thread = threading.Thread(target=self._run, name="bar", daemon=True)
                 self._thread.start()
@@ -180,27 +167,12 @@ class BarCalibration:
         except _StoppedError:
             pass
 
-    def _averaged(self, source: Instrument, stated: Stated, path: Path) -> Calibrated:
+    def _averaged(
+        self, source: Instrument, of_bar: Mapping[str, object], calibrator: Mapping[str, object], path: Path
+    ) -> Calibrated:
         try:
             found = read_on_calibrator(source, self.count, progress=self._progress)
-            file = bar_file(
-                found,
-                {
-                    "serial_number": stated.serial_number,
-                    "temp_c": stated.temp_c,
-                    "temp_uncertainty_k": USUAL_TEMP_UNCERTAINTY_K,
-                    "expansion_um_m_k": STEEL_BAR_UM_M_K,
-                },
-                {
-                    "serial_number": stated.calibrator,
-                    "length_mm": stated.calibrator_mm,
-                    "uncertainty_um": stated.calibrator_u_um,
-                    "certified": stated.certified,
-                    "valid_until": stated.valid_until or None,
-                },
-                self._line.protocol.name,
-                datetime.now(UTC),
-            )
+            file = bar_file(found, of_bar, calibrator, self._line.protocol.name, datetime.now(UTC))
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             raise InputError.of("bar", f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error

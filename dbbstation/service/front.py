@@ -13,8 +13,9 @@ from dbbstation.facts.serialise import as_objects
 from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import known_instruments, load_instrument, load_variants
+from dbbstation.plan.bar import STEEL_BAR_UM_M_K, USUAL_TEMP_UNCERTAINTY_K
 from dbbstation.service.after import JOINT, KINEMATIC, After
-from dbbstation.service.bar_calibration import BarCalibration, Stated, fault_of
+from dbbstation.service.bar_calibration import BarCalibration, fault_of
 from dbbstation.service.choice import Choice, Limits, Prepared, SetUpPart, prepare
 from dbbstation.service.held_line import HeldLine, HeldOpen, ProbeOutcome, ports, probe
 from dbbstation.service.memory import VIRTUAL, Line, Memory
@@ -202,15 +203,25 @@ class Front:
         protocol = line.protocol(lambda: _number(values, "calibrator_mm"))
         return BarCalibration(self._held.line(protocol, line.port, line.baud))
 
-    def stated_bar(self, values: Mapping[str, str]) -> Stated:
-        """Return the stated facts of bar and calibrator.
+    def stated_bar(self, values: Mapping[str, str]) -> tuple[dict[str, object], dict[str, object]]:
+        """Return the stated facts of bar and calibrator by the keys of the bar's file.
 
         Raises:
             NoNumberError: a text is no number.
         """
-        numbers = {name: _number(values, name) for name in ("calibrator_mm", "calibrator_u_um", "temp_c")}
-        texts = {name: values[name] for name in ("serial_number", "calibrator", "certified", "valid_until")}
-        return Stated(**texts, **numbers)  # type: ignore[arg-type] # texts are texts, numbers numbers
+        calibrator: dict[str, object] = {
+            "serial_number": values["calibrator"],
+            "length_mm": _number(values, "calibrator_mm"),
+            "uncertainty_um": _number(values, "calibrator_u_um"),
+            "certified": values["certified"],
+            "valid_until": values["valid_until"] or None,
+        }
+        return {
+            "serial_number": values["serial_number"],
+            "temp_c": _number(values, "temp_c"),
+            "temp_uncertainty_k": USUAL_TEMP_UNCERTAINTY_K,
+            "expansion_um_m_k": STEEL_BAR_UM_M_K,
+        }, calibrator
 
     def fault_of_stated(self, name: str, text: str, line: Line, reads_mm: float | None) -> str:
         """Return a typed text's fault, or an empty text.

@@ -81,7 +81,7 @@ class BarScreen(RowScreen):
             self.look()
             return
         self._problem = ""
-        self._calibration.begin(stated, self._front.new_bar_file())
+        self._calibration.begin(*stated, self._front.new_bar_file())
 
     def action_back(self) -> None:
         found = None if self._calibration is None else self._calibration.found

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ import pytest
 from dbbstation.files.formats.bar import read_bar
 from dbbstation.instrument.library import load_instrument
 from dbbstation.instrument.protocol import Protocol
-from dbbstation.service.bar_calibration import BarCalibration, Stated
+from dbbstation.service.bar_calibration import BarCalibration
 from dbbstation.service.held_line import HeldLine
 from dbbstation.station import events
 from dbbstation.station.detector import seat
@@ -23,7 +22,8 @@ from dbbstation.virtual.wire import VirtualInstrument
 from tests.tui.happenings import Happening, make_plan
 
 CALIBRATOR_MM = 150.0003
-STATED = Stated("DBB-0042", "ZB-17", CALIBRATOR_MM, 0.25, "2026-03-01", 20.3)
+OF_BAR = {"serial_number": "DBB-0042", "temp_c": 20.3, "temp_uncertainty_k": 0.2, "expansion_um_m_k": 11.5}
+CALIBRATOR = {"serial_number": "ZB-17", "length_mm": CALIBRATOR_MM, "uncertainty_um": 0.25, "certified": "2026-03-01"}
 PATIENCE_S = 30.0
 COUNT = 40
 
@@ -51,7 +51,7 @@ def test_what_the_bar_reads_too_long_is_written_into_its_file(protocol: Protocol
         calibration = BarCalibration(line, count=COUNT)
         try:
             until(lambda: calibration.latest is not None)
-            calibration.begin(STATED, path)
+            calibration.begin(OF_BAR, CALIBRATOR, path)
             until(lambda: calibration.found is not None or calibration.failure is not None)
         finally:
             calibration.close()
@@ -78,12 +78,12 @@ def test_no_bar_a_wrong_date_and_a_file_that_exists_are_told(protocol: Protocol,
     ):
         calibration = BarCalibration(line, count=COUNT)
         try:
-            for stated, path, says in (
-                (STATED, tmp_path / "bar.yaml", "are a length"),
-                (replace(STATED, certified="last year"), tmp_path / "bar.yaml", "certified"),
-                (STATED, there, "exists"),
+            for calibrator, path, says in (
+                (CALIBRATOR, tmp_path / "bar.yaml", "are a length"),
+                ({**CALIBRATOR, "certified": "last year"}, tmp_path / "bar.yaml", "certified"),
+                (CALIBRATOR, there, "exists"),
             ):
-                calibration.begin(stated, path)
+                calibration.begin(OF_BAR, calibrator, path)
                 until(lambda: not calibration.busy)
                 assert says in str(calibration.failure)
                 length_mm[0] = CALIBRATOR_MM
@@ -95,7 +95,7 @@ def test_no_bar_a_wrong_date_and_a_file_that_exists_are_told(protocol: Protocol,
 def test_leaving_gives_the_instrument_back(protocol: Protocol, tmp_path: Path) -> None:
     with VirtualInstrument(protocol, lambda _t_s: 150.0) as wire, closing(HeldLine(protocol, wire.port)) as line:
         calibration = BarCalibration(line, count=1_000_000)
-        calibration.begin(STATED, tmp_path / "bar.yaml")
+        calibration.begin(OF_BAR, CALIBRATOR, tmp_path / "bar.yaml")
         until(lambda: calibration.done > 0)
         began_s = time.monotonic()
         calibration.close()
@@ -132,7 +132,7 @@ def test_a_reading_that_is_none_of_the_calibrator_is_not_written(protocol: Proto
     ):
         calibration = BarCalibration(line, count=COUNT)
         try:
-            calibration.begin(replace(STATED, calibrator_mm=100.0003), path)
+            calibration.begin(OF_BAR, {**CALIBRATOR, "length_mm": 100.0003}, path)
             until(lambda: calibration.found is not None or calibration.failure is not None)
         finally:
             calibration.close()

@@ -310,6 +310,19 @@ def of_each_strut(
     )
 
 
+def of_each_joint(
+    plausible_mm: float, meaning: str, axes: str = "xyz", tolerance: float | None = None
+) -> tuple[Parameter, ...]:
+    """Return parameters of the coordinates of each strut's joint."""
+    return tuple(
+        Parameter(
+            f"joint_{k}_{axis.lower()}_mm", "mm", plausible_mm, meaning.format(k, axis), tolerance=tolerance, strut=k
+        )
+        for k in STRUT_NUMBERS
+        for axis in axes
+    )
+
+
 def of_own_strut(by_amplitude: Floats) -> Floats:
     """Return changes of the struts by each strut's own amplitude, shape (n, 6, 6), from those along each, shape (n, 6)."""
     return by_amplitude[:, :, None] * np.eye(STRUTS)

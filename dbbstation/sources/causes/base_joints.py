@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, Motion, Owner, Texts, of_each_joint
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Parameter
 
 USUAL_MM = 0.2
 """Usual error of a joint's coordinate if the machine file states no tolerance [mm]."""
@@ -36,18 +37,7 @@ class BaseJoints(LinearSource):
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         stated = machine.joint_tolerance_mm
-        return tuple(
-            Parameter(
-                name=f"joint_{i + 1}_{axis}_mm",
-                unit="mm",
-                plausible=stated or USUAL_MM,
-                meaning=f"base joint {i + 1} actual minus nominal {axis.upper()}",
-                tolerance=stated,
-                strut=i + 1,
-            )
-            for i in range(STRUTS)
-            for axis in "xyz"
-        )
+        return of_each_joint(stated or USUAL_MM, "base joint {} actual minus nominal {}", "XYZ", stated)
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(base_joint_mm=np.eye(3 * STRUTS).reshape(STRUTS, 3, 3 * STRUTS))

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, Motion, Owner, Texts, of_each_joint
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Parameter
 
 
 class PlatformJoints(LinearSource):
@@ -40,17 +41,7 @@ class PlatformJoints(LinearSource):
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         usual = machine.joint_tolerance_mm or 0.2
-        return tuple(
-            Parameter(
-                f"joint_{i + 1}_{axis}_mm",
-                "mm",
-                usual,
-                f"platform joint {i + 1} actual minus nominal, platform {axis}",
-                strut=i + 1,
-            )
-            for i in range(STRUTS)
-            for axis in "xyz"
-        )
+        return of_each_joint(usual, "platform joint {} actual minus nominal, platform {}")
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(platform_joint_mm=np.eye(3 * STRUTS).reshape(STRUTS, 3, 3 * STRUTS))

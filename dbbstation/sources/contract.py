@@ -454,6 +454,34 @@ class ErrorSource(ABC):
     """Prior standard deviation of undetermined directions, in units of plausible sizes."""
     candidate: ClassVar[bool] = True
     """Whether a diagnosis may name it; False for a mere description of an error."""
+    law: ClassVar[str]
+    """Name of the law; `varies_with`, unless the class states `law`."""
+    simpler_law: ClassVar[str | None]
+    """Name of the law of which this is an extension, or None."""
+    further_laws: ClassVar[tuple[type[ErrorSource], ...]]
+    """Other laws of the cause, except the one by temperatures."""
+    logged_law: ClassVar[type[ErrorSource] | None]
+
+    def __init_subclass__(
+        cls, law: str = "", law_of: type[ErrorSource] | None = None, extends: type[ErrorSource] | None = None
+    ) -> None:
+        """Declare a cause, or another law of a cause, which has the cause's attributes unless it states its own.
+
+        Args:
+            law_of: the cause.
+            extends: its law of which this is an extension.
+        """
+        super().__init_subclass__()
+        if law_of is not None:
+            own = {name for kind in cls.__mro__[: cls.__mro__.index(ErrorSource)] for name in vars(kind)}
+            for name in _OF_EVERY_LAW - own:
+                setattr(cls, name, getattr(law_of, name))
+            if Need.TEMPERATURE in cls.needs:
+                law_of.logged_law = cls
+            else:
+                law_of.further_laws = (*law_of.further_laws, cls)
+        cls.further_laws, cls.logged_law = (), None
+        cls.law, cls.simpler_law = law or cls.varies_with, None if extends is None else extends.law
 
     @abstractmethod
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
@@ -546,15 +574,15 @@ class ErrorSource(ABC):
 
     def by_temperature(self) -> ErrorSource | None:
         """Return the cause's law by logged temperatures, or None."""
-        return None
+        return None if self.logged_law is None else self.logged_law()
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
-        """Return other laws of the cause; by default the law by temperatures.
+        """Return other laws of the cause; by default the declared ones and the law by temperatures.
 
         All laws have the same name and owner; a model contains only one.
         """
         logged = self.by_temperature()
-        return () if logged is None else (logged,)
+        return (*(law() for law in self.further_laws), *(() if logged is None else (logged,)))
 
     def c_form(
         self,
@@ -580,16 +608,6 @@ class ErrorSource(ABC):
         factor up to about one. None by default.
         """
         return Effect()
-
-    @property
-    def law(self) -> str:
-        """Return the law's name; by default `varies_with`."""
-        return self.varies_with
-
-    @property
-    def simpler_law(self) -> str | None:
-        """Return the law of which this is an extension, or None."""
-        return None
 
     @property
     def has_history(self) -> bool:
@@ -627,6 +645,9 @@ class ErrorSource(ABC):
                 remedy=_HOW_TO_GIVE[min(missing)],
             )
 
+
+_OF_EVERY_LAW = {"name", "belongs_to", "texts", "needs", "varies_with", "form_uncertainty", "detail_mm"}
+"""Attributes that all laws of a cause share."""
 
 _HOW_TO_GIVE = {
     Need.POSE: "give poses",

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-    from dbbstation.sources.contract import ErrorSource
 
 
 class Backlash(SourceWithHistory):
@@ -59,9 +58,6 @@ class Backlash(SourceWithHistory):
         origin="play operator (hysteresis of play, Krasnosel'skii and Pokrovskii 1983), of each strut's travel; wind-up: "
         + DAHL,
     )
-
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return (_WoundUp(),)
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         return of_each_strut("strut_{}_um", "µm", 3.0, "play of strut {}, whole width; positive: it stays behind")
@@ -93,26 +89,12 @@ AHEAD = 1.1
 against its drive. With 1.1 it follows the drive, so the error can be compensated."""
 
 
-class _WoundUp(SourceWithHistory):
+class _WoundUp(SourceWithHistory, law="wind-up", law_of=Backlash, extends=Backlash):
     """Drive friction reverses over a travel: presliding by Dahl's law.
 
     For direction s, travel x and width w the error is w z with dz = -(s/2 + z) |dx| / l. At the distance d after a
     reversal of a fully wound strut it is -s w (1/2 - exp(-d / l)).
     """
-
-    name, belongs_to, texts = Backlash.name, Backlash.belongs_to, Backlash.texts
-    detail_mm = Backlash.detail_mm
-    needs = Backlash.needs
-    varies_with = Backlash.varies_with
-    form_uncertainty = Backlash.form_uncertainty
-
-    @property
-    def law(self) -> str:
-        return "wind-up"
-
-    @property
-    def simpler_law(self) -> str:
-        return Backlash().law
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         widths = of_each_strut("strut_{}_um", "µm", 3.0, "wind-up of strut {}, whole width; positive: it stays behind")

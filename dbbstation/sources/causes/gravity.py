@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Compliance, Machine
-    from dbbstation.sources.contract import ErrorSource
 
 PER_KN = 1e-3
 
@@ -52,9 +51,6 @@ class Gravity(LinearSource):
         "flats (Johnson, Contact Mechanics, 1985, sec. 5.6)",
     )
 
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return (_Contacts(),)
-
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         platform_masses(self.name, machine)
         usual = strut_compliance(machine).at_1000mm_mm_per_n / MM_PER_N
@@ -78,18 +74,11 @@ EACH e->strut[i] += stretch(at, i, 1e-6 * v[0]) * t[i];"""
         )
 
 
-class _Contacts(Gravity):
+class _Contacts(Gravity, law="contacts", law_of=Gravity):
     """Contacts lose the compliance h per e-fold of load: c(L) T - h T ln(hypot(T, 0.1 kN) / 1 kN).
 
     Rollers follow this law; a power law of the load is similar.
     """
-
-    @property
-    def law(self) -> str:
-        return "contacts"
-
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return ()
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         (compliance,) = super().parameters(machine)

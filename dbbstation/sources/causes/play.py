@@ -80,9 +80,6 @@ class Play(SourceWithHistory):
         "Gaussian dither (Gelb and Vander Velde, Multiple-Input Describing Functions, 1968)",
     )
 
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return (_Shaken(),)
-
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         platform_masses(self.name, machine)
         plays = of_each_strut("strut_{}_um", "µm", 3.0, "play of strut {}, whole width; positive: load closes it")
@@ -111,25 +108,14 @@ class Play(SourceWithHistory):
         return np.where(width < 0.0, -place, place), by_width, behind
 
 
-class _Shaken(ErrorSource):
+class _Shaken(ErrorSource, law="shaken", law_of=Play, extends=Play):
     """The drive shakes the strut, which crosses its play gradually while the load changes from pull to push.
 
     The strut's force is T plus Gaussian shaking of standard deviation N. Its sign gives the end of the play, so the
     mean extension is w/2 erf(T / (sqrt(2) N)).
     """
 
-    name, belongs_to, texts = Play.name, Play.belongs_to, Play.texts
-    detail_mm = Play.detail_mm
     needs = frozenset({Need.POSE})
-    varies_with, form_uncertainty = Play.varies_with, Play.form_uncertainty
-
-    @property
-    def law(self) -> str:
-        return "shaken"
-
-    @property
-    def simpler_law(self) -> str:
-        return Play().law
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         plays = Play().parameters(machine)[:STRUTS]

@@ -81,9 +81,6 @@ class ReversalSpike(ErrorSource):
     _power = 0.5
     """Exponent of the decay variable over its constant."""
 
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return (_InTime(),)
-
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         heights = of_each_strut("strut_{}_um", "µm", 2.0, "height of the spike of strut {}; positive: it stays behind")
         meaning = "travel of a strut over which its spike falls to 37 %, all struts alike"
@@ -145,18 +142,11 @@ class ReversalSpike(ErrorSource):
         return spike, by_height, by_length, behind
 
 
-class _InTime(ReversalSpike):
+class _InTime(ReversalSpike, law="time", law_of=ReversalSpike):
     """Spikes that decay in time: -s a (1 - exp(-d / c|a|)) exp(-t / T), equal at all turning points and feeds."""
 
     needs = frozenset({Need.POSE, Need.PATH, Need.TIME})
     _power = 1.0
-
-    @property
-    def law(self) -> str:
-        return "time"
-
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return ()
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         meaning = "time in which a spike falls to 37 %, all struts alike"

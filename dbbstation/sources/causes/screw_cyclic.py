@@ -52,9 +52,6 @@ class ScrewCyclic(LinearSource):
         origin="once-per-turn travel variation of a ball screw, v_2pi of ISO 3408-3; eccentricity of a rotary encoder",
     )
 
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return (_TwoHarmonics(), _AlongTheScrew())
-
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         lead_mm = screw_lead_mm(self.name, machine)
         return tuple(
@@ -98,17 +95,10 @@ USUAL_UM = 2.0
 """Usual size of the first harmonic [µm]; sizes fall with the order."""
 
 
-class _TwoHarmonics(ScrewCyclic):
+class _TwoHarmonics(ScrewCyclic, law="two harmonics", law_of=ScrewCyclic):
     """A wave with second harmonic."""
 
     harmonics = (1, 2)
-
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return ()
-
-    @property
-    def law(self) -> str:
-        return "two harmonics"
 
 
 GROWTHS_PERCENT_M = (-200.0, 0.0, 200.0)
@@ -116,19 +106,8 @@ GROWTHS_PERCENT_M = (-200.0, 0.0, 200.0)
 travel."""
 
 
-class _AlongTheScrew(ErrorSource):
+class _AlongTheScrew(ErrorSource, law="along the screw", law_of=ScrewCyclic, extends=_TwoHarmonics):
     """Two harmonics whose amplitude changes along the screw, equally on all struts."""
-
-    name, belongs_to, texts = ScrewCyclic.name, ScrewCyclic.belongs_to, ScrewCyclic.texts
-    varies_with, form_uncertainty = ScrewCyclic.varies_with, ScrewCyclic.form_uncertainty
-
-    @property
-    def law(self) -> str:
-        return "along the screw"
-
-    @property
-    def simpler_law(self) -> str:
-        return _TwoHarmonics().law
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         meaning = "change of the amplitude along the screw, of that at the middle of the travel"

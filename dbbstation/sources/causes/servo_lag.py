@@ -80,9 +80,6 @@ class ServoLag(ErrorSource):
     _more: ClassVar[tuple[tuple[float, float], ...]] = ((1.0, 1.0),)
     """Factors of each six values while a strut shortens, and while it lengthens."""
 
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return (_ByDirection(),)
-
     def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         return Effect(strut_mm=self._lag(motion, machine, values)[0])
 
@@ -135,17 +132,10 @@ class ServoLag(ErrorSource):
         return lag[place].reshape(shape).sum(axis=1), by_constant[place].reshape(shape)
 
 
-class _ByDirection(ServoLag):
+class _ByDirection(ServoLag, law="direction", law_of=ServoLag):
     """The lag is tau + d while a strut lengthens and tau - d while it shortens, because a drive's load depends on direction."""
 
     _more = ((1.0, 1.0), (-1.0, 1.0))
-
-    @property
-    def law(self) -> str:
-        return "direction"
-
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return ()
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         meaning = "time by which strut {} is later than that while it lengthens, and less late while it shortens"

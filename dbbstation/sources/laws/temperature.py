@@ -60,10 +60,8 @@ class FollowsTemperature(LinearSource):
     _of: ClassVar[WarmsUp]
 
     def __init_subclass__(cls, cause: type[WarmsUp]) -> None:
-        super().__init_subclass__()
-        cls.name, cls.belongs_to, cls.texts = cause.name, cause.belongs_to, cause.texts
-        cls.detail_mm = cause.detail_mm
-        cls._of, cause.logged = cause(), cls
+        super().__init_subclass__(law_of=cause)
+        cls._of = cause()
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         warmer_k = self.warmer_k(motion)
@@ -186,7 +184,7 @@ constant, ratios of 0.3 to 0.6 err by at most 2.2 % of growth, 0.5 by 1.2 %; one
 
 
 class WarmsUp(ErrorSource):
-    """A cause in proportion to a growth g(t) over a session. Its module declares the laws `logged` and `staged`."""
+    """A cause in proportion to a growth g(t) over a session."""
 
     needs = frozenset({Need.TIME})
     varies_with = "time"
@@ -195,8 +193,6 @@ class WarmsUp(ErrorSource):
     """Growth from the first sample to the end of the warm-up."""
     usual_s: ClassVar[float]
     """Usual time constant."""
-    logged: ClassVar[type[FollowsTemperature]]
-    staged: ClassVar[type[InTwoStages]]
 
     @abstractmethod
     def per_growth(self, motion: Motion, machine: Machine) -> Effect:
@@ -228,12 +224,6 @@ class WarmsUp(ErrorSource):
         self.require(motion)
         return _times(self.per_growth(motion, machine), self.grown_by(motion, values))
 
-    def by_temperature(self) -> ErrorSource:
-        return self.logged()
-
-    def other_laws(self) -> tuple[ErrorSource, ...]:
-        return (self.staged(), *super().other_laws())
-
 
 def _times(per: Effect, growth: Floats) -> Effect:
     """Return the effect of growths, shape (n,), or of columns of them, (n, p), which become the last axis."""
@@ -256,18 +246,8 @@ class InTwoStages(ErrorSource):
     _one: ClassVar[ErrorSource]
 
     def __init_subclass__(cls, cause: type[WarmsUp]) -> None:
-        super().__init_subclass__()
-        cls.name, cls.belongs_to, cls.texts = cause.name, cause.belongs_to, cause.texts
-        cls.needs, cls.varies_with, cls.detail_mm = cause.needs, cause.varies_with, cause.detail_mm
-        cls._one, cause.staged = cause(), cls
-
-    @property
-    def law(self) -> str:
-        return "two-stages"
-
-    @property
-    def simpler_law(self) -> str:
-        return self._one.law
+        super().__init_subclass__(law="two-stages", law_of=cause, extends=cause)
+        cls._one = cause()
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         growth, constant, *others = self._one.parameters(machine)

@@ -9,6 +9,7 @@ import signal
 import threading
 from collections import Counter, defaultdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 # As the command line does, before NumPy looks: several workers with threads each wait for one another most of the time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -24,6 +25,10 @@ from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.yaml import text
 from dbbstation.machine.geometry import Machine
+from tests.copied import kept_loaded
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 # A command reads one model, tests the same few again and again: as many are kept as 50 MB hold.
 text._of_the_last = functools.lru_cache(maxsize=8)(text._parsed)
@@ -87,6 +92,13 @@ def recordings() -> Path:
 @pytest.fixture(scope="session")
 def reference() -> Machine:
     return read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
+
+
+@pytest.fixture(scope="session")
+def copies() -> Iterator[None]:
+    """The process that `tests.copied` copies stands before a test begins, and is none of what the test leaves open."""
+    with kept_loaded():
+        yield
 
 
 @pytest.fixture

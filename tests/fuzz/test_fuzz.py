@@ -13,8 +13,8 @@ from tests.fuzz.__main__ import cases_of, report
 from tests.fuzz.seeds import SEEDS
 from tests.fuzz.worker import Reached, place, run
 
-CASES, PARTS = 200, 4
-"""Cases of a part: 800 in all, within a minute of one core of CI."""
+CASES, PARTS = 100, 4
+"""Cases of a part: 400 in all, within half a minute of one core of CI."""
 
 
 WORK = """

@@ -1,6 +1,6 @@
 """Programs from a grammar, read by us and by LinuxCNC's own interpreter: the same machine motion, or refused by both.
 
-Four hundred, and a hundred of `test_through_rs274.py`, hold every word of the grammar; `-m nightly` runs ten times as many. `DBBSTATION_FUZZ=5000` runs as many
+Two hundred, and a hundred of `test_through_rs274.py`, hold every word of the grammar; `-m nightly` runs twenty times as many. `DBBSTATION_FUZZ=5000` runs as many
 programs as that; `DBBSTATION_FUZZ_FROM` is the first seed.
 """
 
@@ -26,7 +26,7 @@ pytestmark = [
     pytest.mark.slow,
 ]
 
-COUNT = int(os.environ.get("DBBSTATION_FUZZ", "400"))
+COUNT = int(os.environ.get("DBBSTATION_FUZZ", "200"))
 FIRST = int(os.environ.get("DBBSTATION_FUZZ_FROM", "0"))
 
 ONLY_BY_US = {
@@ -51,7 +51,7 @@ MOST_ONLY_BY_US = 0.08
 """Share of programs; the grammar asks for such things more often than people do."""
 
 
-@pytest.fixture(scope="module", params=[COUNT, pytest.param(10 * COUNT, marks=pytest.mark.nightly)])
+@pytest.fixture(scope="module", params=[COUNT, pytest.param(20 * COUNT, marks=pytest.mark.nightly)])
 def verdicts(request, tmp_path_factory):
     """(seed, text, what we say, what LinuxCNC says) of every program: toolpath or error, events or None."""
     folder, drawn = tmp_path_factory.mktemp("rs274"), programs(request.param)

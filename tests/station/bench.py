@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,9 +17,11 @@ from dbbstation.virtual.control import CellCommands, ControlServer
 from dbbstation.virtual.machine import Sizes, VirtualMachine
 from dbbstation.virtual.truth import random_kinematics
 from dbbstation.virtual.wire_clock import ScaledClock
+from tests.copied import done
 from tests.virtual.faulty import FaultyInstrument as VirtualInstrument
 
 if TYPE_CHECKING:
+    import subprocess
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
@@ -64,7 +64,7 @@ class Bench:
     url: str
 
     def command(self, out: Path, *more: str, auto: bool = True) -> list[str]:
-        words = [sys.executable, "-m", "dbbstation", "measure", "--plan", str(self.plan_file)]
+        words = ["measure", "--plan", str(self.plan_file)]
         words += ["--machine", str(MACHINE_FILE), "--instrument", self.instrument, "--port", self.wire.port]
         words += ["--out", str(out), "--time-scale", str(self.scale)]
         words += [] if auto else ["--bar-waiver", "a virtual machine"]
@@ -72,14 +72,7 @@ class Bench:
         return [*words, *(["--auto", self.url] if auto else []), *more]
 
     def measure(self, out: Path, *more: str, auto: bool = True, typed: str = "") -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            self.command(out, *more, auto=auto),
-            input=typed,
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE_S,
-            check=False,
-        )
+        return done(self.command(out, *more, auto=auto), typed=typed, timeout=PATIENCE_S)
 
 
 @contextmanager

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,19 +18,23 @@ from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.virtual.control import ControlClient
 from dbbstation.virtual.truth import random_kinematics
+from tests.cli.conftest import call
+from tests.copied import started
 from tests.station.bench import MACHINE_FILE, POLLED, STREAM
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.usefixtures("copies")
+
 
 def command(plan_file: Path, *more: str, instrument: str = STREAM) -> list[str]:
     words = ["--instrument", instrument, "--plan", str(plan_file), "--machine", str(MACHINE_FILE)]
-    return [sys.executable, "-m", "dbbstation", "instrument", "emulate", *words, *more]
+    return ["instrument", "emulate", *words, *more]
 
 
-def started(words: list[str]) -> subprocess.Popen[str]:
-    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+def emulated(words: list[str]) -> subprocess.Popen[str]:
+    return started(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 def identified(model: MachineModel) -> IdentifiedModel:
@@ -40,7 +43,7 @@ def identified(model: MachineModel) -> IdentifiedModel:
 
 @pytest.mark.parametrize("ending", ["quit", signal.SIGINT, signal.SIGTERM])
 def test_it_answers_on_both_lines_until_it_is_told_to_end(plan_file: Path, ending: str | signal.Signals) -> None:
-    with started(command(plan_file, "--json", "--time-scale", "20", instrument=POLLED)) as process:
+    with emulated(command(plan_file, "--json", "--time-scale", "20", instrument=POLLED)) as process:
         assert process.stdout is not None
         told = json.loads(process.stdout.readline())
         client = ControlClient(told["control"])
@@ -62,7 +65,7 @@ def test_the_truth_is_that_of_the_model_file(plan_file: Path, tmp_path: Path) ->
     truth = MachineModel(machine, random_kinematics(machine, 12))
     file = tmp_path / "truth.yaml"
     write_model(file, identified(truth))
-    with started(command(plan_file, "--truth", str(file), "--json")) as process:
+    with emulated(command(plan_file, "--truth", str(file), "--json")) as process:
         assert process.stdout is not None
         client = ControlClient(json.loads(process.stdout.readline())["control"])
         sources = {source["name"]: source["parameters"] for source in client.ask("truth")["sources"]}
@@ -75,15 +78,13 @@ def test_the_truth_of_another_machine_is_refused(plan_file: Path, tmp_path: Path
     machine = read_machine(MACHINE_FILE.with_name("every-key.yaml"))
     file = tmp_path / "truth.yaml"
     write_model(file, identified(MachineModel(machine, random_kinematics(machine, 12))))
-    done = subprocess.run(
-        command(plan_file, "--truth", str(file)), capture_output=True, text=True, timeout=60, check=False
-    )
-    assert done.returncode == 1
-    assert "its nominal machine (every key of a machine) is not the one given" in done.stderr
+    done = call(*command(plan_file, "--truth", str(file)))
+    assert done.code == 1
+    assert "its nominal machine (every key of a machine) is not the one given" in done.err
 
 
 def test_without_json_it_prints_what_to_copy(plan_file: Path) -> None:
-    with started(command(plan_file)) as process:
+    with emulated(command(plan_file)) as process:
         assert process.stdout is not None
         lines = [process.stdout.readline() for _ in range(2)]
         process.terminate()

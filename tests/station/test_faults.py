@@ -14,6 +14,8 @@ import pytest
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import read_session
+from tests.cli.conftest import call
+from tests.copied import started
 from tests.station.bench import POLLED, bench, lines_of, wait_for
 
 if TYPE_CHECKING:
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from tests.station.bench import Bench
+
+pytestmark = pytest.mark.usefixtures("copies")
 
 
 @pytest.fixture
@@ -33,7 +37,7 @@ def one_circle(plan_file: Path) -> Path:
 def spoilt(place: Bench, out: Path, spoil: Callable[[], None], *, at_lines: int = 300) -> tuple[int, str]:
     """Measure, do something in mid-run, wait for the end; return the exit code and what was said."""
     part = out / "runs" / "a-ccw-1.csv.part"
-    with subprocess.Popen(place.command(out), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+    with started(place.command(out), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
         wait_for(lambda: lines_of(part) > at_lines, process)
         spoil()
         _, said = process.communicate(timeout=60.0)
@@ -44,7 +48,7 @@ def test_killed_in_mid_run_it_loses_nothing_and_goes_on(one_circle: Path, tmp_pa
     out = tmp_path / "session"
     part = out / "runs" / "a-ccw-1.csv.part"
     with bench(one_circle, scale=30.0) as place:
-        with subprocess.Popen(place.command(out), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as process:
+        with started(place.command(out), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as process:
             wait_for(lambda: lines_of(part) > 300)
             process.kill()
         kept = part.read_bytes()
@@ -153,9 +157,9 @@ def test_a_port_that_is_not_there_leaves_no_session(one_circle: Path, tmp_path: 
     with bench(one_circle) as place:
         command = place.command(out)
         command[command.index("--port") + 1] = "/dev/nothing-here"
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert "there is no such port" in done.stderr
+        done = call(*command)
+    assert done.code == 1
+    assert "there is no such port" in done.err
     assert not out.exists()
 
 
@@ -166,7 +170,7 @@ def test_a_host_that_falls_asleep_in_mid_run(one_circle: Path, tmp_path: Path, s
     part = out / "runs" / "a-ccw-1.csv.part"
     with (
         bench(one_circle, scale=10.0) as place,
-        subprocess.Popen(place.command(out), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process,
+        started(place.command(out), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process,
     ):
         wait_for(lambda: lines_of(part) > 300, process)
         process.send_signal(signal.SIGSTOP)

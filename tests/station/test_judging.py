@@ -30,7 +30,7 @@ from tests.station.bench import MACHINE_FILE
 if TYPE_CHECKING:
     from pathlib import Path
 
-RATE_HZ = 25.0
+RATE_HZ = 10.0
 CCW, CW = Direction.CCW, Direction.CW
 
 Spoilt = Callable[[np.ndarray, np.ndarray], np.ndarray]

@@ -23,6 +23,7 @@ from dbbstation.station.assembly import check_plan
 from dbbstation.trace.cut import cut
 from dbbstation.virtual.machine import Sizes
 from tests.cli.conftest import call
+from tests.copied import started
 from tests.station.bench import MACHINE_FILE, POLLED, STREAM, bench, lines_of, wait_for
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.virtual.machine import VirtualMachine
     from tests.station.bench import Bench
+
+pytestmark = pytest.mark.usefixtures("copies")
 
 QUIET = Sizes(noise_mm=0.0003, bar_uncertainty_mm=0.0005)
 
@@ -75,11 +78,11 @@ def test_a_whole_short_plan_agrees_with_the_truth(plan_file: Path, tmp_path: Pat
 
 def finished_and_another_plan(place: Bench, out: Path) -> None:
     before = (out / "session.yaml").read_bytes()
-    again = call(*place.command(out)[3:])
+    again = call(*place.command(out))
     assert (again.code, (out / "session.yaml").read_bytes()) == (0, before)
     text = place.plan_file.read_text(encoding="utf-8")
     place.plan_file.write_text(text.replace("[ccw, cw]", "[ccw]"), encoding="utf-8")
-    other = call(*place.command(out)[3:])
+    other = call(*place.command(out))
     assert other.code == 1
     assert "the plan of this session is another one" in other.err
     assert "Traceback" not in other.err
@@ -121,7 +124,7 @@ def test_ctrl_c_keeps_everything_and_the_same_command_goes_on(plan_file: Path, t
     plan_file.write_text(re.sub(r"  - \{name: b.*\n", "", text), encoding="utf-8")
     with bench(plan_file, scale=30.0, rate_hz=20.0) as place:
         part = out / "runs" / "a-cw-1.csv.part"
-        with subprocess.Popen(place.command(out), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        with started(place.command(out), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
             wait_for(lambda: lines_of(part) > 100, process)
             process.send_signal(signal.SIGINT)
             _, said = process.communicate(timeout=30.0)

@@ -24,6 +24,8 @@ from tests.station.bench import MACHINE_FILE, bench
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.usefixtures("copies")
+
 MODEL_SHA256 = hashlib.sha256(b"a model").hexdigest()
 
 
@@ -89,7 +91,7 @@ def test_runs_by_program_are_smaller_in_error_and_carry_the_program(
     with bench(one_way, programs=program) as place:  # type: ignore[arg-type]
         first = place.measure(plain)
         second = place.measure(halved, "--programs", str(folder))
-        mixed = call(*place.command(plain, "--programs", str(folder))[3:])
+        mixed = call(*place.command(plain, "--programs", str(folder)))
     assert (first.returncode, second.returncode) == (0, 0), first.stderr + second.stderr
     assert mixed.code == 1
     assert "commanded by plain circles, now NC programs are asked for" in mixed.err

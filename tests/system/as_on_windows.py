@@ -17,6 +17,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import load_instrument
 from dbbstation.service.held_line import probe
 from dbbstation.system import handles, pseudo_terminal, replacing, signals
+from tests.copied import done, started
 from tests.station.bench import STREAM, bench, lines_of, wait_for
 
 if TYPE_CHECKING:
@@ -160,7 +161,7 @@ def test_plug_in_find_the_port_record_pull_the_cable_go_on(tmp_path: Path) -> No
         cable.plugged.set()
         wait_for(lambda: probe(load_instrument(STREAM), cable.port, patience_s=1.0).answers)
         command = [cable.port if word == place.wire.port else word for word in place.command(out)]
-        with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+        with started(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
             wait_for(lambda: lines_of(part) > 200, process)
             cable.plugged.clear()
             time.sleep(0.3)
@@ -168,7 +169,7 @@ def test_plug_in_find_the_port_record_pull_the_cable_go_on(tmp_path: Path) -> No
             _, said = process.communicate(timeout=60.0)
         kept = part.read_bytes() if part.exists() else b""
         if process.returncode != 0:
-            again = subprocess.run(command, capture_output=True, text=True, timeout=60.0, check=False)
+            again = done(command, timeout=60.0)
             assert again.returncode == 0, again.stderr
     assert "Traceback" not in said
     session = read_session(out)

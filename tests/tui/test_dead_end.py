@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-RATE_HZ = 25.0
+RATE_HZ = 10.0
 INSTEAD = {"low": "side", "side": "low"}
 """Which program runs where the first run of a test is asked for."""
 

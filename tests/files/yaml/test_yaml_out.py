@@ -29,6 +29,7 @@ VALUE = st.recursive(
     ),
     max_leaves=20,
 )
+DATA = st.dictionaries(st.one_of(TEXT, LIKE_OTHERS), VALUE, min_size=1, max_size=5)
 
 
 def tuples(value: object) -> object:
@@ -37,12 +38,23 @@ def tuples(value: object) -> object:
     return tuple(map(tuples, value)) if isinstance(value, list) else value
 
 
-@settings(max_examples=500, deadline=None)
-@given(st.dictionaries(st.one_of(TEXT, LIKE_OTHERS), VALUE, min_size=1, max_size=5))
+@settings(max_examples=100, deadline=None)
+@given(DATA)
 @example({"a": {}, "b": [], "c": [[]], "d": [{}]})
 @example({"a": [[{"b": [[1]]}]]})
 @example({"": "\x85\u2028\ufeff\x7f\U0001f600"})
 def test_any_data_reads_back(data: dict[str, object]) -> None:
+    reads_back(data)
+
+
+@pytest.mark.nightly
+@settings(max_examples=1000, deadline=None)
+@given(DATA)
+def test_much_data_reads_back(data: dict[str, object]) -> None:
+    reads_back(data)
+
+
+def reads_back(data: dict[str, object]) -> None:
     text = yaml_text(data)
     faults = []
     document = parse_yaml(text, "x.yaml", faults)

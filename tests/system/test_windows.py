@@ -22,11 +22,11 @@ RUN = (
     "tests/station/test_faults.py::test_killed_in_mid_run_it_loses_nothing_and_goes_on",
     "tests/service/test_front.py::test_work_answers_with_its_result",
     "tests/service/test_front.py::test_work_can_be_ended",
-    "tests/cli/test_history_command.py::test_several_processes_give_the_same",
+    "tests/cli/test_history_command.py::test_a_recording_that_is_damaged_afterwards_is_noticed_at_once",
     "tests/tasks/test_executors.py::test_processes_do_each_piece_once",
     "tests/tasks/test_executors.py::test_a_process_that_is_killed_loses_nothing",
 )
-"""Locks, journals, logs and seals; a circle recorded, killed and resumed; verdicts; jobs of the screen, a report among them; fleets."""
+"""Locks, journals, logs and seals; a circle recorded, killed and resumed; verdicts; jobs of the screen, a report among them; what a history keeps; work in processes."""
 
 NOT_THERE = (
     "session_that_is_moved_in_mid_run",  # no folder with an open file can be moved

@@ -323,9 +323,10 @@ def of_each_joint(
     )
 
 
-def of_own_strut(by_amplitude: Floats) -> Floats:
-    """Return changes of the struts by each strut's own amplitude, shape (n, 6, 6), from those along each, shape (n, 6)."""
-    return by_amplitude[:, :, None] * np.eye(STRUTS)
+def of_own_strut(along: Floats) -> Floats:
+    """Return changes of the struts by each strut's own p amplitudes, shape (n, 6, 6 p), from those along each, shape (n, 6, p) or (n, 6)."""
+    own = np.atleast_3d(along)[:, :, None, :] * np.eye(STRUTS)[:, :, None]
+    return own.reshape(*along.shape[:2], STRUTS * own.shape[3])
 
 
 @dataclass(frozen=True)

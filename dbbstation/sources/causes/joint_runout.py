@@ -19,6 +19,7 @@ from dbbstation.sources.contract import (
     Owner,
     Parameter,
     Texts,
+    of_own_strut,
 )
 
 if TYPE_CHECKING:
@@ -97,10 +98,7 @@ class JointRunout(LinearSource):
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         lengths = motion.once(self.name, machine, lambda: _per_offset(motion, machine))
-        own = np.zeros((len(motion), STRUTS, STRUTS, lengths.shape[2]))
-        each = np.arange(STRUTS)
-        own[:, each, each] = MM_PER_UM * lengths
-        return Effect(strut_mm=own.reshape(len(motion), STRUTS, -1))
+        return Effect(strut_mm=of_own_strut(MM_PER_UM * lengths))
 
     def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         rest = inverse(machine.hexapod, middle(machine)).unit[0]

@@ -18,6 +18,7 @@ from dbbstation.sources.contract import (
     Owner,
     Parameter,
     Texts,
+    of_own_strut,
 )
 from dbbstation.sources.laws.weights import screw_lead_mm
 
@@ -75,11 +76,8 @@ class ScrewCyclic(LinearSource):
 
     def waves_mm(self, motion: Motion, machine: Machine) -> Floats:
         turned_rad = 2.0 * np.pi / screw_lead_mm(self.name, machine) * motion.struts(machine).length_mm
-        own = []
-        for order in self.harmonics:
-            waves = np.stack([np.sin(order * turned_rad), np.cos(order * turned_rad)], axis=-1)
-            own.append((waves[:, :, None, :] * np.eye(STRUTS)[:, :, None]).reshape(len(motion), STRUTS, -1))
-        return np.asarray(MM_PER_UM * np.concatenate(own, axis=2), dtype=np.float64)
+        waves = [np.stack([np.sin(k * turned_rad), np.cos(k * turned_rad)], axis=-1) for k in self.harmonics]
+        return np.asarray(MM_PER_UM * np.concatenate([of_own_strut(wave) for wave in waves], axis=2), dtype=np.float64)
 
     def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         body = """for (int order = 1; order <= harmonics; order++) EACH {

@@ -19,6 +19,7 @@ from dbbstation.sources.contract import (
     Owner,
     Parameter,
     Texts,
+    of_own_strut,
 )
 from dbbstation.sources.laws.weights import platform_masses
 
@@ -66,8 +67,7 @@ def piecewise_linear(points: Floats, values: Floats) -> Effect:
     count = len(points)
     place = np.clip((values - points[0]) / (points[1] - points[0]), 0.0, count - 1.0)
     near = np.maximum(0.0, 1.0 - np.abs(place[:, :, None] - np.arange(count)))
-    own = near[:, :, None, :] * np.eye(STRUTS)[:, :, None]
-    return Effect(strut_mm=MM_PER_UM * own.reshape(len(values), STRUTS, STRUTS * count))
+    return Effect(strut_mm=MM_PER_UM * of_own_strut(near))
 
 
 def texts(variable: str, equation: str) -> Texts:
@@ -198,8 +198,7 @@ class UnexplainedWave(ErrorSource):
         by_angle = by_strut[:, 0] * cosine - by_strut[:, 1] * sine
         period = np.where(by_strut[:, 2] == 0.0, np.inf, by_strut[:, 2])
         each = np.concatenate([waves, (-by_angle * turned_rad / period)[:, :, None]], axis=-1)
-        own = each[:, :, None, :] * np.eye(STRUTS)[:, :, None]
-        return Effect(strut_mm=MM_PER_UM * own.reshape(len(motion), STRUTS, 3 * STRUTS))
+        return Effect(strut_mm=MM_PER_UM * of_own_strut(each))
 
     def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         body = """EACH {

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import re
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from dbbstation.errors import OutputError
 from dbbstation.files.atomic import is_leftover, remove_leftovers, write_bytes, write_text
 from dbbstation.files.gateway import content_of
 from dbbstation.files.recordings.lock import LOCK_FILE, SessionLock
+from dbbstation.system.handles import Closing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,8 +29,8 @@ _LONGEST = 60
 """Number of characters of a session's name in file names."""
 
 
-class FleetFolder:
-    """Results of one task in a folder; a context manager.
+class FleetFolder(Closing):
+    """Results of one task in a folder.
 
     Raises:
         OutputError: the folder contains other files, or cannot be written.
@@ -57,11 +58,7 @@ class FleetFolder:
             self._lock = SessionLock(folder)
             remove_leftovers(folder)
 
-    def __enter__(self) -> Self:
-        """Return the folder."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         """Unlock the folder for other processes."""
         if self._lock is not None:
             self._lock.close()

@@ -10,11 +10,12 @@ import logging
 import os
 import sqlite3
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from dbbstation.files.gateway import sha256_hex
 from dbbstation.files.keys import key_of
 from dbbstation.files.places import real_path
+from dbbstation.system.handles import Closing
 from dbbstation.system.mounts import file_system
 
 if TYPE_CHECKING:
@@ -67,8 +68,8 @@ class _Row:
     text: str
 
 
-class CacheFile:
-    """An SQLite file in the user's cache folder; a damaged one is begun anew. A context manager.
+class CacheFile(Closing):
+    """An SQLite file in the user's cache folder; a damaged one is begun anew.
 
     Attributes:
         problem: why nothing can be kept; empty if possible.
@@ -84,13 +85,6 @@ class CacheFile:
             self._give_up(problem)
         else:
             self._open()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the file."""
-        self.close()
 
     def close(self) -> None:
         """Close the file; everything is already written."""

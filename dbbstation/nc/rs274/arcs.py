@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.nc.rs274.blocks import ModalGroup, name
+from dbbstation.nc.rs274.state import CENTRES
 from dbbstation.nc.toolpath import PLANES, on_arc
 
 if TYPE_CHECKING:
@@ -130,9 +131,6 @@ def centre_by_radius(
     side = 1.0 if clockwise == (radius_mm < 0.0) else -1.0
     scale = side * height / (2.0 * half)
     return float(start[0] + end[0]) / 2.0 - dy * scale, float(start[1] + end[1]) / 2.0 + dx * scale
-
-
-CENTRES = "IJK"
 
 
 def arc_of(

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from dbbstation.nc.rs274.blocks import ProgramBlock
-    from dbbstation.nc.rs274.state import ControlState
+    from dbbstation.nc.rs274.state import ControlState, ModalCycle
 
 PECK_MM = 0.254
 """Clearance of a peck from the bottom of the previous peck, and height by which G73 lifts: 0.01 inch [LinuxCNC]."""
@@ -49,52 +49,39 @@ class Depths(NamedTuple):
     peck: float = 0.0
 
 
-class ModalCycle:
-    """State of drilling cycles between lines.
+def depths_of(
+    cycle: ModalCycle, code: float, block: ProgramBlock, state: ControlState, column: int, *, absolute: bool
+) -> Depths:
+    """Return the depths of a cycle, and remove the cycle's words from the block.
 
-    Attributes:
-        numbers: Z, R and Q [mm] and P [s].
-        begun_at: Z before the first of successive cycles, in machine coordinates [mm]; NaN if not known.
-        dwell_s: P of the last cycle that had one: a tapping cycle without P has it [LinuxCNC].
-        to_clear: whether they end at R (G99); None: neither G98 nor G99 was read.
+    Args:
+        absolute: whether Z and R count from the origin (G90).
+
+    Raises:
+        BadLine: numbers are missing, or make no sense.
     """
-
-    def __init__(self) -> None:
-        self.numbers: dict[str, float] = {}
-        self.begun_at, self.dwell_s = math.nan, 0.0
-        self.to_clear: bool | None = None
-
-    def depths(self, code: float, block: ProgramBlock, state: ControlState, column: int, *, absolute: bool) -> Depths:
-        """Return the depths of a cycle, and remove the cycle's words from the block.
-
-        Args:
-            absolute: whether Z and R count from the origin (G90).
-
-        Raises:
-            BadLine: numbers are missing, or make no sense.
-        """
-        numbers, unit, offset = self.numbers, state.unit_mm, state.offset[2]
-        for letter, scale in (("Z", unit), ("R", unit), ("Q", unit), ("P", 1.0)):
-            if letter in block.words:
-                numbers[letter] = scale * block.words.pop(letter).value
-        self.dwell_s = numbers.get("P", self.dwell_s)
-        lacking = {"Z", "R", *(["Q"] if code in PECKS else [])} - numbers.keys()
-        if lacking:
-            what = f"{name('G', code)} needs {' and '.join(sorted(lacking))}"
-            raise block.fault(what, "give them in its line", column)
-        unknown, up = unplaced(state.pose), self.begun_at
-        if unknown or math.isnan(up):
-            raise unknown_place(block, unknown or ["Z"])
-        clear = numbers["R"] + (offset if absolute else up)
-        bottom = numbers["Z"] + (offset if absolute else clear)
-        if bottom > clear or (code in PECKS and numbers["Q"] <= 0.0):
-            raise block.fault("a cycle goes down from R to Z, by a positive Q", "check R, Z and Q", column)
-        if code in PECKS and (clear - bottom) / numbers["Q"] > MOST_PECKS:
-            raise block.fault(f"more than {MOST_PECKS} pecks in one hole", "check Q", column)
-        if self.to_clear is None and up > clear:
-            what = "neither G98 nor G99 says how high a cycle ends, and controls differ in what they begin with"
-            raise block.fault(what, "write G98 or G99 before it", column)
-        return Depths(clear, bottom, clear if self.to_clear else max(up, clear), numbers.get("Q", 0.0))
+    numbers, unit, offset = cycle.numbers, state.unit_mm, state.offset[2]
+    for letter, scale in (("Z", unit), ("R", unit), ("Q", unit), ("P", 1.0)):
+        if letter in block.words:
+            numbers[letter] = scale * block.words.pop(letter).value
+    cycle.dwell_s = numbers.get("P", cycle.dwell_s)
+    lacking = {"Z", "R", *(["Q"] if code in PECKS else [])} - numbers.keys()
+    if lacking:
+        what = f"{name('G', code)} needs {' and '.join(sorted(lacking))}"
+        raise block.fault(what, "give them in its line", column)
+    unknown, up = unplaced(state.pose), cycle.begun_at
+    if unknown or math.isnan(up):
+        raise unknown_place(block, unknown or ["Z"])
+    clear = numbers["R"] + (offset if absolute else up)
+    bottom = numbers["Z"] + (offset if absolute else clear)
+    if bottom > clear or (code in PECKS and numbers["Q"] <= 0.0):
+        raise block.fault("a cycle goes down from R to Z, by a positive Q", "check R, Z and Q", column)
+    if code in PECKS and (clear - bottom) / numbers["Q"] > MOST_PECKS:
+        raise block.fault(f"more than {MOST_PECKS} pecks in one hole", "check Q", column)
+    if cycle.to_clear is None and up > clear:
+        what = "neither G98 nor G99 says how high a cycle ends, and controls differ in what they begin with"
+        raise block.fault(what, "write G98 or G99 before it", column)
+    return Depths(clear, bottom, clear if cycle.to_clear else max(up, clear), numbers.get("Q", 0.0))
 
 
 def cycle_steps(code: float, depths: Depths, turning: str) -> Iterator[Step]:

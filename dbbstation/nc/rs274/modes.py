@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dbbstation.nc.rs274.arcs import CENTRES
 from dbbstation.nc.rs274.blocks import CURVES, CYCLES, NEEDED, STORED, ModalGroup, name
-from dbbstation.nc.rs274.cycles import ModalCycle
 from dbbstation.nc.rs274.flow import Flow
-from dbbstation.nc.rs274.state import AXES, ControlState
+from dbbstation.nc.rs274.state import AXES, CENTRES, ControlState, ModalCycle
 from dbbstation.nc.rs274.tokens import shown
 from dbbstation.nc.toolpath import (
     ALL_AXES,

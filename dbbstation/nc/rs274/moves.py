@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.nc.rs274.arcs import CENTRES, Arc, arc_of, curve_of
 from dbbstation.nc.rs274.blocks import CURVES, CYCLES, TAPS, ModalGroup, name
-from dbbstation.nc.rs274.cycles import cycle_steps
-from dbbstation.nc.rs274.state import AXES, unknown_place, unplaced
+from dbbstation.nc.rs274.state import AXES, CENTRES, unknown_place, unplaced
 from dbbstation.nc.toolpath import (
     IN_FORCE,
     LEAST_MM,
@@ -23,6 +21,7 @@ from dbbstation.nc.toolpath import (
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
+    from dbbstation.nc.rs274.arcs import Arc
     from dbbstation.nc.rs274.blocks import ProgramBlock
     from dbbstation.nc.rs274.cutter import Cutter, Element
     from dbbstation.nc.rs274.tokens import BadLine, Word
@@ -77,6 +76,8 @@ class Moves(Modes):
             block.take(letter)
 
     def _arc(self, block: ProgramBlock, target: Floats) -> Arc:
+        from dbbstation.nc.rs274.arcs import arc_of  # noqa: PLC0415 - as for `Cutter`
+
         if self._left_contour:
             raise block.fault("the move behind G40 is an arc", "leave it straight")
         arc = arc_of(
@@ -92,6 +93,8 @@ class Moves(Modes):
         return arc
 
     def _curve(self, block: ProgramBlock, named: list[str]) -> None:
+        from dbbstation.nc.rs274.arcs import curve_of  # noqa: PLC0415 - the same
+
         code = block.codes[ModalGroup.SMOOTHING]
         other = block.words.keys() - set("XYIJPQ") or {*block.codes} & {ModalGroup.MOTION, ModalGroup.ONCE}
         if (
@@ -139,6 +142,7 @@ class Moves(Modes):
         self._state.pose = target
 
     def _along(self, cutter: Cutter, element: Element, arc: Arc | None, block: ProgramBlock, target: Floats) -> None:
+        from dbbstation.nc.rs274.arcs import Arc  # noqa: PLC0415 - the same
         from dbbstation.nc.rs274.cutter import Beside, with_plane  # noqa: PLC0415 - the same
 
         plane, last = PLANES[self._plane], self._beside
@@ -282,6 +286,8 @@ class Moves(Modes):
         return [radius * math.cos(angle) + offset[0], radius * math.sin(angle) + offset[1]]
 
     def _run_cycle(self, block: ProgramBlock, named: list[str]) -> None:
+        from dbbstation.nc.rs274.cycles import cycle_steps, depths_of  # noqa: PLC0415 - the same
+
         column, code = block.first_column, self._motion or 0.0
         times = block.take("L")
         if self._plane != 0 or self._per_move or {"A", "B", "C"} & set(named):
@@ -289,7 +295,7 @@ class Moves(Modes):
             raise block.fault(what, "post cycles as single moves", column)
         if self._cutter is not None:
             raise block.fault("a cycle beside a contour (G41, G42)", "write G40 before it", column)
-        depths = self._cycle.depths(code, block, self._state, column, absolute=self._absolute)
+        depths = depths_of(self._cycle, code, block, self._state, column, absolute=self._absolute)
         self._check_feed(block, column)
         if code in TAPS:
             self._check_tap(block, code)

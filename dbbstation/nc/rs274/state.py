@@ -20,9 +20,25 @@ if TYPE_CHECKING:
     from dbbstation.nc.rs274.tokens import BadLine, Word
     from dbbstation.nc.setup import ControlSetup
 
-AXES = "XYZABC"
+AXES, CENTRES = "XYZABC", "IJK"
 
 POSITION, SYSTEM, TOOL, LENGTH = 5420, 5220, 5400, 5401
+
+
+class ModalCycle:
+    """State of drilling cycles between lines.
+
+    Attributes:
+        numbers: Z, R and Q [mm] and P [s].
+        begun_at: Z before the first of successive cycles, in machine coordinates [mm]; NaN if not known.
+        dwell_s: P of the last cycle that had one: a tapping cycle without P has it [LinuxCNC].
+        to_clear: whether they end at R (G99); None: neither G98 nor G99 was read.
+    """
+
+    def __init__(self) -> None:
+        self.numbers: dict[str, float] = {}
+        self.begun_at, self.dwell_s = math.nan, 0.0
+        self.to_clear: bool | None = None
 
 
 class ControlState:

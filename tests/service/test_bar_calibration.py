@@ -14,7 +14,9 @@ from dbbstation.files.formats.bar import read_bar
 from dbbstation.instrument.library import load_instrument
 from dbbstation.instrument.protocol import Protocol
 from dbbstation.service.bar_calibration import BarCalibration
+from dbbstation.service.front import Front
 from dbbstation.service.held_line import HeldLine
+from dbbstation.service.memory import Memory
 from dbbstation.station import events
 from dbbstation.station.detector import seat
 from dbbstation.tui.reading_panel import ReadingPanel
@@ -24,6 +26,9 @@ from tests.tui.happenings import Happening, make_plan
 CALIBRATOR_MM = 150.0003
 OF_BAR = {"serial_number": "DBB-0042", "temp_c": 20.3, "temp_uncertainty_k": 0.2, "expansion_um_m_k": 11.5}
 CALIBRATOR = {"serial_number": "ZB-17", "length_mm": CALIBRATOR_MM, "uncertainty_um": 0.25, "certified": "2026-03-01"}
+TYPED = {"serial_number": "DBB-0042", "calibrator": "ZB-17", "calibrator_mm": "150,0003", "calibrator_u_um": "0.25"}
+TYPED |= {"certified": "2026-03-01", "valid_until": "", "temp_c": "20.3"}
+"""The same, as the operator types it."""
 PATIENCE_S = 30.0
 COUNT = 40
 
@@ -51,7 +56,7 @@ def test_what_the_bar_reads_too_long_is_written_into_its_file(protocol: Protocol
         calibration = BarCalibration(line, count=COUNT)
         try:
             until(lambda: calibration.latest is not None)
-            calibration.begin(OF_BAR, CALIBRATOR, path)
+            calibration.begin(*Front(tmp_path, Memory(tmp_path / "state.json")).stated_bar(TYPED), path)
             until(lambda: calibration.found is not None or calibration.failure is not None)
         finally:
             calibration.close()
@@ -62,7 +67,11 @@ def test_what_the_bar_reads_too_long_is_written_into_its_file(protocol: Protocol
     assert file.readings.count == COUNT
     assert 1e3 * (file.readings.mean_mm - CALIBRATOR_MM) == pytest.approx(found.long_um)
     assert found.u_um == pytest.approx(1e3 * file.uncertainty_mm)
-    assert (file.serial_number, file.calibrator.serial_number) == ("DBB-0042", "ZB-17")
+    assert (file.serial_number, file.calibrator.serial_number, file.calibrator.length_mm) == (
+        "DBB-0042",
+        "ZB-17",
+        150.0003,
+    )
 
 
 def test_no_bar_a_wrong_date_and_a_file_that_exists_are_told(protocol: Protocol, tmp_path: Path) -> None:

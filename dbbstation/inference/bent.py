@@ -33,10 +33,15 @@ AT_ONCE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class _Table:
-    """Rows of the laws, in time order within blocks; `size` is the prior standard deviation of an effect."""
+class LawRows:
+    """Rows of the laws, in time order within blocks.
 
-    time: Floats
+    Attributes:
+        time: shape (n,); None for unordered rows.
+        size: prior standard deviation of an effect.
+    """
+
+    time: Floats | None
     time_unit: str
     blocks: Sequence[slice]
     size: float
@@ -84,16 +89,11 @@ class _Table:
         return [(f"start {k + 1}", self.unit) for k in range(count)]
 
 
-def memory_laws(
-    variables: Sequence[Variable],
-    time: Floats,
-    time_unit: str,
-    blocks: Sequence[slice],
-    size: float,
-    unit: str,
-) -> list[Law]:
+def memory_laws(table: LawRows, variables: Sequence[Variable]) -> list[Law]:
     """Return laws with lag and dead time for each path variable."""
-    table = _Table(time, time_unit, blocks, size, unit)
+    time, blocks, size = table.time, table.blocks, table.size
+    if time is None:
+        return []
     usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0 and v.is_path(blocks)]
     moving = [rows for rows in blocks if rows.stop - rows.start > 1]
     steps = [np.diff(time[rows]) for rows in moving]
@@ -102,21 +102,21 @@ def memory_laws(
     row = float(np.median(np.concatenate(steps)))
     longest = max(float(np.sum(step)) for step in steps)
     kinds = (
-        (Family.MEMORY, "time constant", _lag, _grid(BOUNDS.memory_rows * row, BOUNDS.memory_share * longest)),
-        (Family.DEAD_TIME, "dead time", _delay, _grid(row, BOUNDS.delay_share * longest)),
+        (Family.MEMORY, "time constant", lagging, _grid(BOUNDS.memory_rows * row, BOUNDS.memory_share * longest)),
+        (Family.DEAD_TIME, "dead time", delayed, _grid(row, BOUNDS.delay_share * longest)),
     )
     found = []
-    for family, parameter, columns, grid in kinds:
+    for family, parameter, late, grid in kinds:
         for variable in usable if grid else ():
             starts = starts_of(blocks) if family is Family.MEMORY else 0
             found.append(
                 table.law(
                     family,
                     (variable,),
-                    partial(columns, variable, time, blocks),
+                    partial(_late, variable, time, blocks, starts, late),
                     [("gain", table.per(variable))] * 2 + table.starts(starts),
                     len(usable),
-                    (parameter, time_unit, grid),
+                    (parameter, table.time_unit, grid),
                     plausible=np.array([size / variable.half_range] * 2 + [size] * starts),
                     choices=_choices(2 + starts),
                 )
@@ -137,31 +137,32 @@ def _grid(shortest: float, longest: float) -> tuple[float, ...]:
     return tuple(np.geomspace(shortest, longest, BOUNDS.memory_lengths).tolist()) if longest > 2.0 * shortest else ()
 
 
-def _lag(variable: Variable, time: Floats, blocks: Sequence[slice], point: tuple[float, ...]) -> Floats:
-    """Return delayed values, delayed less present values, and initial transients, shape (n, 2 + starts)."""
-    starts = starts_of(blocks)
+def _late(
+    variable: Variable,
+    time: Floats,
+    blocks: Sequence[slice],
+    starts: int,
+    late: Callable[[Floats, Floats, float], Floats],
+    point: tuple[float, ...],
+) -> Floats:
+    """Return delayed values, delayed less present values, and initial transients, shape (n, 2 + starts).
+
+    Args:
+        late: function from values, their times and the delay to delayed less present values.
+    """
     found = np.zeros((len(time), 2 + starts))
     for k, rows in enumerate(blocks):
         values, at = variable.travel(rows), time[rows]
-        found[rows, 1] = lagging(values, at, point[0])
+        found[rows, 1] = late(values, at, point[0])
         found[rows, 0] = values - _middle(variable) + found[rows, 1]
-        found[rows, 2 + (k if starts > 1 else 0)] = np.exp(-(at - at[0]) / point[0])
+        if starts:
+            found[rows, 2 + (k if starts > 1 else 0)] = np.exp(-(at - at[0]) / point[0])
     return found
 
 
 def starts_of(blocks: Sequence[slice]) -> int:
     """Return the number of a law's initial states: one per run, or one in all if there are many runs."""
     return len(blocks) if len(blocks) <= BOUNDS.memory_starts else 1
-
-
-def _delay(variable: Variable, time: Floats, blocks: Sequence[slice], point: tuple[float, ...]) -> Floats:
-    """Return delayed values and delayed less present values, shape (n, 2); values are constant before the first row."""
-    found = np.zeros((len(time), 2))
-    for rows in blocks:
-        values, at = variable.travel(rows), time[rows]
-        behind = delayed(values, at, point[0])
-        found[rows] = np.column_stack([values - _middle(variable) + behind, behind])
-    return found
 
 
 def _middle(variable: Variable) -> float:
@@ -187,25 +188,17 @@ MADE = 0.9
 """Share of the simulated value's squares that a linear model must explain before its slopes give directions of growth."""
 
 
-def bent_laws(
-    variables: Sequence[Variable],
-    time: Floats | None,
-    time_unit: str,
-    blocks: Sequence[slice],
-    size: float,
-    unit: str,
-    grows: Mapping[str, float] | None = None,
-) -> list[Law]:
+def bent_laws(table: LawRows, variables: Sequence[Variable], grows: Mapping[str, float]) -> list[Law]:
     """Return saturation, dead zone and knees for each variable; with time also friction, integral and scaled hysteresis.
 
     Args:
         grows: result of `grows_with`, which distinguishes a limit from a dead zone.
     """
-    table = _Table(np.zeros(0) if time is None else time, time_unit, blocks, size, unit)
+    time, blocks = table.time, table.blocks
     usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0]
     bending = [v for v in usable if v.distinct >= DISTINCT]
     found = [
-        _bend(table, family, v, (grows or {}).get(v.name, 0.0), len(bending))
+        _bend(table, family, v, grows.get(v.name, 0.0), len(bending))
         for family in (Family.SATURATION, Family.DEAD_ZONE)
         for v in bending
     ]
@@ -214,8 +207,8 @@ def bent_laws(
         return found
     paths = [v for v in usable if v.is_path(blocks)]
     turning = [v for v in paths if v.kind in TRAVELS and (v.range or np.ptp(v.directions(blocks)) > 0.0)]
-    found += [_friction(table, v, len(turning)) for v in turning]
-    found += [_integral(table, v, len(usable)) for v in usable]
+    found += [_friction(table, time, v, len(turning)) for v in turning]
+    found += [_integral(table, time, v, len(usable)) for v in usable]
     pairs = [(a, b) for a, b in permutations(usable, 2) if a in turning and b.kind in SCALES_WITH]
     return found + [_scaled(table, a, b, len(pairs)) for a, b in pairs]
 
@@ -251,13 +244,13 @@ def is_same(one: Floats, other: Floats) -> bool:
     return abs(float(np.corrcoef(one, other)[0, 1])) > 1.0 - SAME
 
 
-def _bend(table: _Table, family: Family, variable: Variable, grows: float, members: int) -> Law:
+def _bend(table: LawRows, family: Family, variable: Variable, grows: float, members: int) -> Law:
     """Return saturation or dead zone, according to the simulated value's growth with a variable."""
     # A limit and a dead zone of one width add up to a straight line. If the simulation contains this line, an object
     # with a limit lacks the part beyond the width, and an object with a dead zone lacks the part within. The sign
     # decides.
     # Centred at zero if it has both signs, else at mid-range.
-    middle = 0.0 if variable.low < 0.0 < variable.high else 0.5 * (variable.low + variable.high)
+    middle = 0.0 if variable.low < 0.0 < variable.high else _middle(variable)
     values, largest = variable.values - middle, max(variable.high - middle, middle - variable.low)
     unit, slope, dead = table.unit, table.per(variable), family is Family.DEAD_ZONE
 
@@ -299,7 +292,7 @@ def _bend(table: _Table, family: Family, variable: Variable, grows: float, membe
     )
 
 
-def _knee(table: _Table, side: str, variable: Variable, members: int) -> Law:
+def _knee(table: LawRows, side: str, variable: Variable, members: int) -> Law:
     def columns(point: tuple[float, ...]) -> Floats:
         beyond = variable.values - point[0]
         return (np.maximum(beyond, 0.0) if side == "upper" else np.minimum(beyond, 0.0))[:, None]
@@ -309,8 +302,8 @@ def _knee(table: _Table, side: str, variable: Variable, members: int) -> Law:
     return table.law(Family.KNEE, (variable,), columns, slope, members, shape, side=f"{side} ")
 
 
-def _friction(table: _Table, variable: Variable, members: int) -> Law:
-    rate = variable.rates(table.time, table.blocks)
+def _friction(table: LawRows, time: Floats, variable: Variable, members: int) -> Law:
+    rate = variable.rates(time, table.blocks)
     grid = tuple(share * float(np.abs(rate).max()) for share in SPEEDS)
     shape = "turns over within", f"{variable.unit or variable.name}/{table.time_unit}", grid
     size = [("size", table.unit)]
@@ -332,13 +325,13 @@ def integral_of(values: Floats, time: Floats, blocks: Sequence[slice]) -> Floats
     return found
 
 
-def _integral(table: _Table, variable: Variable, members: int) -> Law:
+def _integral(table: LawRows, time: Floats, variable: Variable, members: int) -> Law:
     """Return a law for accumulating quantities, such as mass or heat, with each run's initial value."""
     # The balanced value of a signal is seldom zero (outflow, bias, room temperature), so the law includes a linear
     # drift.
-    time, blocks = table.time, table.blocks
+    blocks = table.blocks
     starts = starts_of(blocks) if len(blocks) > 1 else 0
-    middle = 0.5 * (variable.low + variable.high)
+    middle = _middle(variable)
     travel = np.concatenate([variable.travel(rows) for rows in blocks])
     samples = np.zeros((len(time), 2 + starts))
     samples[:, 0] = integral_of(travel - middle, time, blocks)
@@ -350,7 +343,7 @@ def _integral(table: _Table, variable: Variable, members: int) -> Law:
     return table.law(Family.INTEGRAL, (variable,), lambda _: samples, amplitudes, members, zero_from=middle)
 
 
-def _scaled(table: _Table, one: Variable, by: Variable, members: int) -> Law:
+def _scaled(table: LawRows, one: Variable, by: Variable, members: int) -> Law:
     turned = [one.directions(table.blocks)]
     turned += [within(one.values, table.blocks, share * one.extent) for share in TRANSITS[:-1]]
     labels = ("at once", *(f"over {share * one.extent:.3g} {one.unit}".strip() for share in TRANSITS[:-1]))

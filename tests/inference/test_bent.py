@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from dbbstation.inference.bent import bent_laws, grows_with, integral_of, memory_laws
+from dbbstation.inference.bent import LawRows, bent_laws, grows_with, integral_of, memory_laws
 from dbbstation.inference.channel import Kind, Variable, beyond_reach
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
@@ -26,10 +26,8 @@ def laws_of(data):
     """New laws of a table, beside lags and dead times, by name."""
     whole = channel(data, blocks=1)
     variables, blocks = whole.variables, whole.blocks
-    found = bent_laws(variables, data.t, "s", blocks, 0.2, "mm") + memory_laws(
-        variables, data.t, "s", blocks, 0.2, "mm"
-    )
-    return {law.name: law for law in found}
+    rows = LawRows(data.t, "s", blocks, 0.2, "mm")
+    return {law.name: law for law in (*bent_laws(rows, variables, {}), *memory_laws(rows, variables))}
 
 
 def test_columns_are_their_formulas():
@@ -67,7 +65,7 @@ def test_the_integral_of_a_sine_is_a_cosine():
 def test_rows_without_order_have_no_direction_and_no_past():
     data = table(1, rows=200)
     variables = channel(data, blocks=1).variables
-    found = bent_laws(variables, None, "s", (slice(0, 200),), 0.2, "mm")
+    found = bent_laws(LawRows(None, "s", (slice(0, 200),), 0.2, "mm"), variables, {})
     assert {law.family for law in found} == {Family.SATURATION, Family.DEAD_ZONE, Family.KNEE}
 
 
@@ -108,12 +106,12 @@ def test_a_table_that_lacks_one_names_it_with_its_numbers(name):
 def test_a_simulated_straight_line_tells_a_dead_zone_from_a_limit():
     """Measured is flat within 7 where the simulation goes straight on, or beyond it: the difference has the other form."""
     data = table(1, rows=400)
-    variables, blocks = channel(data, blocks=1).variables, (slice(0, 400),)
+    variables, rows = channel(data, blocks=1).variables, LawRows(data.t, "s", (slice(0, 400),), 0.2, "mm")
     within = np.clip(data.q, -7.0, 7.0)
     for slope in (2.0, -2.0):
         simulated = slope * data.q + 0.3 * data.load
         grows = grows_with(variables, simulated, 0.2)
-        laws = {law.name: law for law in bent_laws(variables, data.t, "s", blocks, 0.2, "mm", grows)}
+        laws = {law.name: law for law in bent_laws(rows, variables, grows)}
         for name, measured in (("dead zone of q", slope * (data.q - within)), ("saturation of q", slope * within)):
             law = laws[name]
             columns = law.columns((7.0,))
@@ -126,7 +124,7 @@ def test_a_simulated_straight_line_tells_a_dead_zone_from_a_limit():
             assert all(law.positive)
     # What the simulation does not have in a straight line has no sign.
     grows = grows_with(variables, np.cos(data.t), 0.2)
-    laws = {law.name: law for law in bent_laws(variables, data.t, "s", blocks, 0.2, "mm", grows)}
+    laws = {law.name: law for law in bent_laws(rows, variables, grows)}
     assert not laws["dead zone of q"].positive
 
 

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.inference.bank import Bank
-from dbbstation.inference.bent import memory_laws
+from dbbstation.inference.bent import LawRows, memory_laws
 from dbbstation.inference.channel import Base, Channel, Kind, Law, Variable
 from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.levels import Verdict
@@ -42,9 +42,11 @@ def test_each_block_begins_by_itself():
     time = np.tile(np.arange(50.0), 2)
     values = np.concatenate([np.sin(time[:50] / 9.0), 5.0 + np.sin(time[50:] / 9.0)])
     blocks = (slice(0, 50), slice(50, 100))
-    (memory, dead) = memory_laws([Variable("x", "mm", Kind.LENGTH, values)], time, "s", blocks, 1.0, "mm")
+    (memory, dead) = memory_laws(LawRows(time, "s", blocks, 1.0, "mm"), [Variable("x", "mm", Kind.LENGTH, values)])
     both = memory.columns((4.0,))
-    alone = memory_laws([Variable("x", "mm", Kind.LENGTH, values[50:])], time[50:], "s", blocks[:1], 1.0, "mm")[0]
+    alone = memory_laws(
+        LawRows(time[50:], "s", blocks[:1], 1.0, "mm"), [Variable("x", "mm", Kind.LENGTH, values[50:])]
+    )[0]
     assert both[50:, 1] == pytest.approx(alone.columns((4.0,))[:, 1], abs=1e-12)
     # A dead time of three rows is a shift by three rows.
     shifted = dead.columns((3.0,))[:, 1] + values
@@ -57,7 +59,7 @@ def test_many_runs_begin_alike():
     time = np.tile(np.arange(40.0), 7)
     values = np.sin(np.tile(np.arange(40.0), 7) / 9.0)
     blocks = tuple(slice(40 * k, 40 * k + 40) for k in range(7))
-    memory = memory_laws([Variable("x", "mm", Kind.LENGTH, values)], time, "s", blocks, 1.0, "mm")[0]
+    memory = memory_laws(LawRows(time, "s", blocks, 1.0, "mm"), [Variable("x", "mm", Kind.LENGTH, values)])[0]
     columns = memory.columns((4.0,))
     assert columns.shape == (280, 3)
     assert columns[:, 2] == pytest.approx(np.tile(np.exp(-np.arange(40.0) / 4.0), 7))
@@ -68,7 +70,7 @@ def test_what_stands_still_or_jumps_has_no_memory(rng):
     time = np.arange(60.0)
     poses = Variable("pose", "mm", Kind.LENGTH, rng.uniform(0.0, 100.0, 60))
     clock = Variable("t_s", "s", Kind.TIME, time)
-    assert memory_laws([poses, clock], time, "s", (slice(0, 60),), 1.0, "mm") == []
+    assert memory_laws(LawRows(time, "s", (slice(0, 60),), 1.0, "mm"), [poses, clock]) == []
 
 
 def _late(values, time, constant):

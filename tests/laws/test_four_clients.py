@@ -9,7 +9,7 @@ from dbbstation.diagnosis.drive.signals import signals_of
 from dbbstation.diagnosis.drive.sources import force, known_drive_sources
 from dbbstation.diagnosis.simulator.terms import Term, TermForm, evaluator
 from dbbstation.diagnosis.table.data import Table
-from dbbstation.inference.bent import memory_laws
+from dbbstation.inference.bent import LawRows, memory_laws
 from dbbstation.inference.channel import Kind, Variable
 from dbbstation.inference.patterns import Family, patterns
 from dbbstation.laws.contract import Scale
@@ -169,7 +169,7 @@ def delay_of_a_drive():
 
 
 def delay_of_a_table():
-    law = memory_laws([Variable("x", "mm", Kind.LENGTH, X)], T, "s", (slice(0, len(T)),), 1.0, "mm")[1]
+    law = memory_laws(LawRows(T, "s", (slice(0, len(T)),), 1.0, "mm"), [Variable("x", "mm", Kind.LENGTH, X)])[1]
     late = T > LATE_S
     return law.columns((LATE_S,))[late, 1], (20.0 * np.sin(T - LATE_S) - X)[late]
 
@@ -219,7 +219,7 @@ def lag_of_a_drive():
 
 
 def lag_of_a_table():
-    law = memory_laws([Variable("x", "mm", Kind.LENGTH, X)], T, "s", (slice(0, len(T)),), 1.0, "mm")[0]
+    law = memory_laws(LawRows(T, "s", (slice(0, len(T)),), 1.0, "mm"), [Variable("x", "mm", Kind.LENGTH, X)])[0]
     return law.columns((LATE_S,))[:, 1], behind(X, T, LATE_S, 0.0)
 
 

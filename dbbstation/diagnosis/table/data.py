@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.bent import bent_laws, grows_with, is_same, memory_laws
+from dbbstation.inference.bent import LawRows, bent_laws, grows_with, is_same, memory_laws
 from dbbstation.inference.channel import Base, Channel, Kind, Law, Variable
 from dbbstation.inference.triangle import ROUNDING, rms
 from dbbstation.laws.contract import SourceForm
@@ -97,9 +97,8 @@ class Table:
             own = Variable(self.simulated_name, self.unit, Kind.ANY, fitted.simulated)
             over = (*fitted.variables, own) if fitted.simulated_is_variable else fitted.variables
             grows = grows_with(over, fitted.simulated, size)
-            laws += bent_laws(follows, time, time_unit, self.blocks, size, self.unit, grows)
-            if time is not None:
-                laws += memory_laws(follows, time, time_unit, self.blocks, size, self.unit)
+            rows = LawRows(time, time_unit, self.blocks, size, self.unit)
+            laws += [*bent_laws(rows, follows, grows), *memory_laws(rows, follows)]
         return Channel(
             residual=residual,
             unit=self.unit,

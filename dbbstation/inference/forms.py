@@ -42,13 +42,12 @@ class Form(ABC):
     def columns(self, values: Floats) -> Floats:
         """Return each amplitude's curve at values, shape (..., p)."""
 
-    def points(self, low: float, high: float) -> Floats:
+    def points(self, low: float, high: float, /) -> Floats:
         """Return points to print within the range, shape (q,); by default three, enough for a straight line."""
         return np.linspace(low, high, 3)
 
-    def text(self, unit: str) -> str:
+    def text(self, _unit: str, /) -> str:
         """Return what distinguishes this form, in the variable's unit; may be empty."""
-        del unit
         return ""
 
 
@@ -65,8 +64,7 @@ class LinearSplines(Form):
         place = (values - self.low) / np.maximum(self.high - self.low, 1e-12) * (SPLINES - 1)
         return np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(SPLINES)))
 
-    def points(self, low: float, high: float) -> Floats:
-        del low, high
+    def points(self, _low: float, _high: float, /) -> Floats:
         return np.linspace(np.mean(self.low), np.mean(self.high), SPLINES)
 
 
@@ -90,8 +88,7 @@ class Walk(Form):
         steps = np.diff(self.at)
         return np.clip((values[..., None] - self.at[:-1]) / steps, 0.0, 1.0) * np.sqrt(steps / self.unit)
 
-    def points(self, low: float, high: float) -> Floats:
-        del low, high
+    def points(self, _low: float, _high: float, /) -> Floats:
         return self.at
 
 
@@ -106,7 +103,7 @@ class Wave(Form):
     def count(self) -> int:
         return 2 * self.harmonics
 
-    def text(self, unit: str) -> str:
+    def text(self, unit: str, /) -> str:
         more = f" and {self.harmonics - 1} harmonics" if self.harmonics > 1 else ""
         return f"period {1.0 / self.frequency:.6g} {unit}{more}"
 
@@ -114,7 +111,7 @@ class Wave(Form):
         phase = 2.0 * np.pi * self.frequency * np.asarray(values)
         return np.stack([f(k * phase) for k in range(1, self.harmonics + 1) for f in (np.cos, np.sin)], axis=-1)
 
-    def points(self, low: float, high: float) -> Floats:
+    def points(self, low: float, high: float, /) -> Floats:
         periods = (high - low) * self.frequency
         periods = periods if periods <= BOUNDS.periods_shown else 1.0
         span = periods / self.frequency
@@ -132,8 +129,7 @@ class WaveOfTurn(Form):
 
     count = 4
 
-    def text(self, unit: str) -> str:
-        del unit
+    def text(self, _unit: str, /) -> str:
         return f"{self.frequency:.4g} per turn"
 
     def columns(self, values: Floats) -> Floats:
@@ -141,8 +137,7 @@ class WaveOfTurn(Form):
         ccw = (values > 0.0)[..., None]
         return np.concatenate([both * ccw, both * ~ccw], axis=-1)
 
-    def points(self, low: float, high: float) -> Floats:
-        del low, high
+    def points(self, _low: float, _high: float, /) -> Floats:
         turn = np.linspace(0.0, 1.0, int(np.ceil(BOUNDS.points_per_wave * max(self.frequency, 1.0))) + 1)
         return np.concatenate([-turn[:0:-1], turn[1:]])
 
@@ -157,16 +152,14 @@ class Lobes(Form):
     def count(self) -> int:
         return 2 * len(self.numbers)
 
-    def text(self, unit: str) -> str:
-        del unit
+    def text(self, _unit: str, /) -> str:
         return f"{self.numbers[0]} lobes" if len(self.numbers) == 1 else ""
 
     def columns(self, values: Floats) -> Floats:
         theta = np.radians(values)
         return np.stack([f(k * theta) for k in self.numbers for f in (np.cos, np.sin)], axis=-1)
 
-    def points(self, low: float, high: float) -> Floats:
-        del low, high
+    def points(self, _low: float, _high: float, /) -> Floats:
         step = 10.0 if max(self.numbers) <= 10 else 5.0  # noqa: PLR2004 - lobes as in `LOBES`
         return np.arange(0.0, 360.0, step)
 
@@ -178,13 +171,13 @@ class Bump(Form):
     centre: float
     width: float
 
-    def text(self, unit: str) -> str:
+    def text(self, unit: str, /) -> str:
         return f"about {self.centre:.5g} {unit}, {self.width:.3g} {unit} wide either way"
 
     def columns(self, values: Floats) -> Floats:
         return np.exp(-0.5 * ((values - self.centre) / self.width) ** 2)[..., None]
 
-    def points(self, low: float, high: float) -> Floats:
+    def points(self, low: float, high: float, /) -> Floats:
         return _across(self.centre, self.width, low, high)
 
 
@@ -195,13 +188,13 @@ class StepForm(Form):
     at: float
     width: float
 
-    def text(self, unit: str) -> str:
+    def text(self, unit: str, /) -> str:
         return f"at {self.at:.5g} {unit}"
 
     def columns(self, values: Floats) -> Floats:
         return 0.5 * np.tanh((values - self.at) / self.width)[..., None]
 
-    def points(self, low: float, high: float) -> Floats:
+    def points(self, low: float, high: float, /) -> Floats:
         return _across(self.at, self.width, low, high)
 
 
@@ -218,8 +211,7 @@ class SignForm(Form):
     def columns(self, values: Floats) -> Floats:
         return np.sign(values)[..., None]
 
-    def points(self, low: float, high: float) -> Floats:
-        del low, high
+    def points(self, _low: float, _high: float, /) -> Floats:
         return np.array([-1.0, 1.0])
 
 
@@ -245,8 +237,7 @@ class Plane(Form):
     def count(self) -> int:
         return self.coordinates + self.constant
 
-    def text(self, unit: str) -> str:
-        del unit
+    def text(self, _unit: str, /) -> str:
         return "with a constant" if self.constant else ""
 
     def columns(self, values: Floats) -> Floats:
@@ -263,7 +254,7 @@ class PlaneStep(Form):
     at: float
     width: float
 
-    def text(self, unit: str) -> str:
+    def text(self, unit: str, /) -> str:
         return f"across a line {self.at:.4g} {unit} from the origin, at {self.across_deg:.0f} deg to +X"
 
     @property
@@ -279,7 +270,7 @@ class PlaneStep(Form):
         """Return the step from minus to plus a half, at values of shape (n, 2)."""
         return StepForm(self.at, self.width).columns(self.along(values))
 
-    def points(self, low: float, high: float) -> Floats:
+    def points(self, low: float, high: float, /) -> Floats:
         return _across(self.at, self.width, low, high)
 
 
@@ -297,8 +288,7 @@ class Spring(Form):
 
     count = 2
 
-    def text(self, unit: str) -> str:
-        del unit
+    def text(self, _unit: str, /) -> str:
         return f"towards {self.towards_deg:.0f} deg to +X"
 
     def columns(self, values: Floats) -> Floats:
@@ -315,7 +305,7 @@ class Ringing(Form):
 
     count = 2
 
-    def text(self, unit: str) -> str:
+    def text(self, unit: str, /) -> str:
         return f"period {self.period:.3g} {unit}, fading over {self.decay:.3g} {unit}"
 
     def columns(self, values: Floats) -> Floats:
@@ -324,8 +314,7 @@ class Ringing(Form):
         fading = -np.sign(values) * np.exp(-since / self.decay)
         return np.stack([fading * np.cos(phase), fading * np.sin(phase)], axis=-1)
 
-    def points(self, low: float, high: float) -> Floats:
-        del low
+    def points(self, _low: float, high: float, /) -> Floats:
         last = min(high, BOUNDS.tails_shown * self.decay)
         return np.linspace(1e-6, last, max(int(BOUNDS.points_per_wave * last / self.period), 2) + 1)
 
@@ -345,7 +334,7 @@ class BehindReversal(Form):
     def count(self) -> int:
         return self.halves
 
-    def text(self, unit: str) -> str:
+    def text(self, unit: str, /) -> str:
         return f"over {self.length:.3g} {unit}"
 
     def columns(self, values: Floats) -> Floats:
@@ -353,8 +342,7 @@ class BehindReversal(Form):
         hats = [np.interp(np.abs(values), places, row) for row in np.eye(len(places))[1:-1]]
         return -np.sign(values)[..., None] * np.stack(hats, axis=-1)
 
-    def points(self, low: float, high: float) -> Floats:
-        del low, high
+    def points(self, _low: float, _high: float, /) -> Floats:
         return self.length * np.append(0.0, 0.5 ** np.arange(self.halves, -1, -1))
 
 

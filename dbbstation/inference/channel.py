@@ -357,13 +357,7 @@ class Channel:
     @cached_property
     def size(self) -> float:
         """Return the residual's rms after the base fit, an upper bound of effects."""
-        left = self.target - self.base.samples[self.kept] @ self.fitted(self.target, self._about).x
-        return max(
-            rms(left),
-            self.least_noise,
-            1e-12 * float(np.abs(self.target).max(initial=0.0)),
-            1e-300,
-        )
+        return self._at_least(rms(self.target - self.base.samples[self.kept] @ self.fitted(self.target, self._about).x))
 
     @cached_property
     def known(self) -> Columns:
@@ -404,9 +398,10 @@ class Channel:
 
     @property
     def _about(self) -> float:
-        return max(
-            float(np.std(self.target)), self.least_noise, 1e-12 * float(np.abs(self.target).max(initial=0.0)), 1e-300
-        )
+        return self._at_least(float(np.std(self.target)))
+
+    def _at_least(self, size: float) -> float:
+        return max(size, self.least_noise, 1e-12 * float(np.abs(self.target).max(initial=0.0)), 1e-300)
 
     def _block(self, target: Floats) -> Block:
         return compress(np.arange(self.base.samples.shape[1]), self.base.samples[self.kept], target)

@@ -418,7 +418,7 @@ class Left:
 
 @dataclass(frozen=True, eq=False)
 class Fitting:
-    """Orthonormal basis of whitened columns with Gaussian priors; extensible.
+    """Orthonormal basis of whitened columns with Gaussian priors.
 
     Attributes:
         axes: orthonormal basis over rows and one row per prior, shape (n + b, k).
@@ -431,25 +431,16 @@ class Fitting:
 
     @classmethod
     def of(cls, columns: Floats, sd: Floats, coloured: Coloured, whitening: csr_array | None) -> Fitting:
-        """Return basis of whitened columns with Gaussian priors."""
-        none = np.zeros((len(columns), 0))
-        return cls(none, len(columns), coloured, whitening).beside(columns, sd)
-
-    def beside(self, columns: Floats, sd: Floats) -> Fitting:
-        """Return basis with further columns, shape (n, k); unknown priors are infinite."""
-        noise = self.coloured.innovation
-        bounded = np.flatnonzero(np.isfinite(sd))
+        """Return basis of whitened columns, shape (n, k), with Gaussian priors; unknown priors are infinite."""
+        noise = coloured.innovation
         size = np.where(np.isfinite(sd), sd, noise / norms(columns))
-        priors = np.zeros((len(bounded), columns.shape[1]))
-        priors[np.arange(len(bounded)), bounded] = 1.0
-        old = np.vstack([self.axes, np.zeros((len(priors), self.axes.shape[1]))])
-        new = np.vstack([self.without_axes(columns * (size / noise)), priors])
-        return replace(self, axes=np.hstack([old, np.linalg.qr(new)[0]]))
+        rows = np.vstack([columns * (size / noise), np.eye(len(sd))[np.isfinite(sd)]])
+        return cls(np.linalg.qr(rows)[0], len(columns), coloured, whitening)
 
     def without_axes(self, columns: Floats) -> Floats:
         """Subtract from columns over noise, shape (n, k), their projection on `axes`; return shape (n + b, k)."""
         new = np.vstack([columns, np.zeros((len(self.axes) - self.rows, columns.shape[1]))])
-        for _ in range(2 if self.axes.shape[1] else 0):  # twice is enough [Giraud et al., Numer. Math. 101 (2005) 87]
+        for _ in range(2):  # twice is enough [Giraud et al., Numer. Math. 101 (2005) 87]
             new = new - self.axes @ (self.axes.T @ new)
         return new
 

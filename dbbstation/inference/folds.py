@@ -109,9 +109,8 @@ def _held_out(
 
 
 def _restricted(block: Block, active: Integers) -> Block:
-    place = {int(column): k for k, column in enumerate(active)}
-    inside = np.array([int(column) in place for column in block.columns], dtype=bool)
-    columns = np.array([place[int(c)] for c in block.columns[inside]], dtype=np.int64)
+    inside = np.isin(block.columns, active)
+    columns = np.searchsorted(active, block.columns[inside])
     return Block(columns, block.triangle[:, inside], block.target, block.count, block.square)
 
 

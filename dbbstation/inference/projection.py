@@ -200,14 +200,6 @@ class _Without(CauseColumns):
         along = whole.along if only is None else whole.along[:, only]
         self._along_left = self._turned.T @ (along - (self._out @ axes).T)
 
-    @property
-    def samples(self) -> Floats:
-        return self._whole.samples
-
-    @property
-    def gram(self) -> Floats:
-        return self.own_gram()
-
     def own_gram(self) -> Floats:
         gram, own = self._whole.gram, self.numbers
         return _less(gram.copy() if own is None else gram[np.ix_(own, own)], self._out.T)

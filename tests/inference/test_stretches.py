@@ -150,13 +150,12 @@ def test_sums_of_squares_of_a_stretch_are_those_of_its_whitened_rows(longest):
         assert found[length] + length * taps.sum() ** 2 == pytest.approx(float(whitened @ whitened))
 
 
-def test_what_is_left_beside_columns_in_two_parts_is_ridge_regression(rng):
+def test_what_is_left_beside_columns_is_ridge_regression(rng):
     """[Hoerl and Kennard 1970]: normal equations with the precision of each prior, none where nothing is known."""
     columns, target, noise = rng.normal(size=(80, 6)), rng.normal(size=80), 0.7
     columns[:, 4] += 3.0 * columns[:, 0]
     sd = np.array([np.inf, np.inf, 1.0, 0.1, 3.0, np.inf])
-    first = Fitting.of(columns[:, :3], sd[:3], Coloured(noise), None)
-    left = first.beside(columns[:, 3:], sd[3:]).left(target)
+    left = Fitting.of(columns, sd, Coloured(noise), None).left(target)
     precision = np.diag(np.where(np.isfinite(sd), 1.0 / sd**2, 0.0))
     values = np.linalg.solve(columns.T @ columns / noise**2 + precision, columns.T @ target / noise**2)
     np.testing.assert_allclose(left.rest, (target - columns @ values) / noise, atol=1e-12)

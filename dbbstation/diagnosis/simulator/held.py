@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -80,43 +80,46 @@ def predicted_parts(
     nodes: Nodes, base: Node, found: SearchOutcome, stated: FittedState, progress: Callable[[str, int, int], None]
 ) -> Iterator[PredictedPart]:
     """Predict each part, as far as the simulation budget permits."""
-    work, channel = nodes.work, found.node.channel
-    as_simulated = work.residuals([stated])[0]
-    every = parts(work)
+    as_simulated, every = nodes.work.residuals([stated])[0], parts(nodes.work)
     classes = [one.wanted for one in classes_of(found.settled, VariableProbabilities(found.settled))]
     for done, (name, rows) in enumerate(every):
         progress("held-out part", done, len(every))
-        out = rows | beside(channel, rows, found.settled.noise.correlation_samples)
+        yield _predicted(nodes, base, found, as_simulated, classes, name, rows)
 
-        one = search(nodes, base, partial(_without, out=out, found=found), refits=False)
-        _, refitted = near(work, base.fitted, lambda r, out=out: r[~out], max(base.size, 1e-300))  # type: ignore[misc]  # bound now
-        others = channel.without(out)
-        with_all = log_density(work, others, rows, one.residual, one.node.fitted.columns)
-        known: dict[frozenset[str], tuple[float, float]] = {frozenset(): (0.0, rms(one.residual[rows]))}
 
-        def brought(
-            names: frozenset[str],
-            one: SearchOutcome = one,
-            known: dict[frozenset[str], tuple[float, float]] = known,
-            rows: Flags = rows,
-            others: Channel = others,
-            with_all: float = with_all,
-        ) -> tuple[float, float]:
-            if names not in known:
-                less = one.node
-                for name in sorted(names):
-                    less = nodes.without(less, name)
-                _, left = near(work, less.fitted, *noise_of(one.settled))
-                known[names] = with_all - log_density(work, others, rows, left, less.fitted.columns), rms(left[rows])
-            return known[names]
+def _predicted(
+    nodes: Nodes,
+    base: Node,
+    found: SearchOutcome,
+    as_simulated: Floats,
+    classes: Sequence[frozenset[str]],
+    name: str,
+    rows: Flags,
+) -> PredictedPart:
+    work, channel = nodes.work, found.node.channel
+    out = rows | beside(channel, rows, found.settled.noise.correlation_samples)
+    one = search(nodes, base, partial(_without, out=out, found=found), refits=False)
+    _, refitted = near(work, base.fitted, lambda values: values[~out], max(base.size, 1e-300))
+    others = channel.without(out)
+    with_all = log_density(work, others, rows, one.residual, one.node.fitted.columns)
 
-        gains: dict[tuple[str, ...], float] = {(term,): brought(frozenset({term}))[0] for term in one.node.names}
-        of_classes = {frozenset[str](): brought(frozenset(one.node.names))}
-        for wanted in classes:
-            own = (name for name in one.node.names if followed_by(one.settled.bank, name) & wanted)
-            of_classes[wanted] = brought(frozenset(own))
-        before, middle, after = (rms(values[rows]) for values in (as_simulated, refitted, one.residual))
-        yield PredictedPart(name, int(rows.sum()), before, middle, after, gains, rows, of_classes)
+    @cache
+    def brought(terms: frozenset[str]) -> tuple[float, float]:
+        """Return the gain of log density by some terms, and the rms error without them."""
+        if not terms:
+            return 0.0, rms(one.residual[rows])
+        less = one.node
+        for term in sorted(terms):
+            less = nodes.without(less, term)
+        _, left = near(work, less.fitted, *noise_of(one.settled))
+        return with_all - log_density(work, others, rows, left, less.fitted.columns), rms(left[rows])
+
+    names, bank = one.node.names, one.settled.bank
+    gains: dict[tuple[str, ...], float] = {(term,): brought(frozenset({term}))[0] for term in names}
+    wanted = {own: frozenset(term for term in names if followed_by(bank, term) & own) for own in classes}
+    of_classes = {own: brought(terms) for own, terms in {frozenset[str](): frozenset(names), **wanted}.items()}
+    before, middle, after = (rms(values[rows]) for values in (as_simulated, refitted, one.residual))
+    return PredictedPart(name, int(rows.sum()), before, middle, after, gains, rows, of_classes)
 
 
 def _without(channel: Channel, out: Flags, found: SearchOutcome) -> Settled:

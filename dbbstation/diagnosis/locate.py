@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from dbbstation.diagnosis.findings import Location
-from dbbstation.diagnosis.parts import SESSION_TIME
+from dbbstation.diagnosis.parts import SESSION_TIME, through_struts
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import smooth
 from dbbstation.inference.left_over import COUNTS_SIGMA
@@ -92,17 +92,11 @@ def locate(
 
 def strut_contributions(calibration: Calibration, fitted: Sequence[Fitted]) -> list[Floats | None]:
     """Return struts' contributions to readings per run, shape (n, 6) [mm]."""
-    model = calibration.model
-    contributions: list[Floats | None] = []
-    for observation in calibration.observations:
-        motion = observation.motion()
-        reading = model.bar(motion)
-        effect = MachineModel(model.machine, tuple(fitted)).effect(motion, reading.actual)
-        if effect.strut_mm is None:
-            contributions.append(None)
-            continue
-        lengths = np.broadcast_to(effect.strut_mm, (len(motion), 6))
-        contributions.append((reading.sensitivity.response.per_strut * lengths)[motion.kept])
+    contributions = []
+    for motion in (observation.motion() for observation in calibration.observations):
+        reading = calibration.model.bar(motion)
+        effect = MachineModel(calibration.model.machine, tuple(fitted)).effect(motion, reading.actual)
+        contributions.append(through_struts(effect, motion, reading))
     return contributions
 
 

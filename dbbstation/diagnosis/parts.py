@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.patterns import Choices
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import BarReading
-    from dbbstation.sources.contract import ErrorSource, Motion, Parameter
+    from dbbstation.sources.contract import Effect, ErrorSource, Motion, Parameter
 
 
 ALIKE = "all struts alike"
@@ -212,9 +212,14 @@ def _strut_contributions(
         effect.fixed_ball_mm,
         effect.reading_mm,
     )
-    if effect.strut_mm is None or any(other is not None for other in others):
+    return None if any(other is not None for other in others) else through_struts(effect, motion, reading)
+
+
+def through_struts(effect: Effect, motion: Motion, reading: BarReading) -> Floats | None:
+    """Return an effect on the reading through each strut, shape (n, 6) [mm]; None without an effect on struts."""
+    if effect.strut_mm is None:
         return None
-    lengths = np.broadcast_to(np.asarray(effect.strut_mm), (len(motion), STRUTS))
+    lengths = np.broadcast_to(effect.strut_mm, (len(motion), STRUTS))
     return (reading.sensitivity.response.per_strut * lengths)[motion.kept]
 
 

@@ -6,6 +6,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.interpolate import RegularGridInterpolator
 
 from dbbstation.diagnosis.simulator.terms import MEMORIES, TermForm
 from dbbstation.diagnosis.simulator.work import PerturbedParameter
@@ -206,20 +207,13 @@ MOST_ANSWER = 100.0
 
 
 def _between(grids: tuple[tuple[float, ...], ...], columns: Floats) -> Callable[[tuple[float, ...]], Floats]:
-    table = columns.reshape(*(len(grid) for grid in grids), *columns.shape[1:])
+    several = [k for k, grid in enumerate(grids) if len(grid) > 1]
+    table = columns.reshape(*(len(grids[k]) for k in several), *columns.shape[1:])
+    if not several:
+        return lambda _point: table
+    between = RegularGridInterpolator([grids[k] for k in several], table)
 
     def at(point: tuple[float, ...]) -> Floats:
-        found = table
-        for grid, value in zip(grids, point, strict=True):
-            if len(grid) == 1:
-                found = found[0]
-                continue
-            k = int(np.clip(np.searchsorted(grid, value) - 1, 0, len(grid) - 2))
-            share = float(np.clip((value - grid[k]) / (grid[k + 1] - grid[k]), 0.0, 1.0))
-            found = (1.0 - share) * found[k] + share * found[k + 1]
-        return found
+        return np.asarray(between([[np.clip(point[k], grids[k][0], grids[k][-1]) for k in several]])[0])
 
-    if not grids:
-        alone = columns[0]
-        return lambda _point: alone
     return at

@@ -6,7 +6,6 @@ Sums over bins of a variable give the squares that curves explain, quickly.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,20 +80,6 @@ class Sums:
             base=np.stack([added(base, gain[:, d]) for d in range(directions)], axis=1),
         )
 
-    @cached_property
-    def scaled(self) -> tuple[Floats, float, float]:
-        """Return bins from -1 to 1, shape (b,), and their middle and half range."""
-        low, high = float(self.at.min()), float(self.at.max())
-        half = max((high - low) / 2.0, np.finfo(np.float64).tiny)
-        return (self.at - (low + high) / 2.0) / half, (low + high) / 2.0, half
-
-    @cached_property
-    def cardinal(self) -> Floats:
-        """Return the polynomials that are one at one of `NODES` and zero at the others, shape (24, b)."""
-        at_nodes, at_bins = (np.polynomial.chebyshev.chebvander(x, len(NODES) - 1) for x in (NODES, self.scaled[0]))
-        at_nodes[:, 1:] *= 2.0
-        return at_nodes @ at_bins.T / len(NODES)
-
     def explained(self, curves: Floats) -> Floats:
         """Return the squares, shape (m,), that curves, shape (b, m, p), explain given the base."""
         pieces, many, count = curves.shape
@@ -138,13 +123,12 @@ class Sums:
             extent: of the variable.
         """
         found = []
-        for frequency in frequencies:
-            waves, best = NearbyWaves(self, frequency), frequency
+        for best in frequencies:
             for step in FINER:
-                near = np.asarray(best + np.arange(-15, 16) * step / extent, dtype=np.float64)
+                near = best + np.arange(-15, 16) * step / extent
                 near = near[near > 0.25 / extent]
-                explained = waves.explained(near)
-                best = float(near[int(explained.argmax())])
+                explained = self.of_forms([Wave(frequency) for frequency in near.tolist()])
+                best = float(near[int(explained.argmax())])  # noqa: PLW2901 - improved twice
             found.append((float(explained.max()), Wave(best)))
         return sorted(found, key=lambda one: -one[0])
 
@@ -170,39 +154,6 @@ def steps(low: float, high: float, count: int) -> list[Form]:
     """Return sharp steps, not at the ends."""
     wide = (high - low) / count
     return [StepForm(float(at), wide / 4.0) for at in np.linspace(low, high, count + 1)[2:-2]] if wide > 0.0 else []
-
-
-class NearbyWaves:
-    """Squares explained by waves near a frequency, from sums at Chebyshev points.
-
-    For x in -1..1, exp(i a x) is interpolated between its values at `NODES` Chebyshev points, whose error is twice the
-    sum of the |J_n(a)| beyond [Trefethen, Approximation Theory and Approximation Practice, 2013, ch. 4].
-    """
-
-    def __init__(self, sums: Sums, frequency: float) -> None:
-        self._frequency, self._directions = frequency, sums.rest.shape[1]
-        self._mean = sums.gains.sum(axis=0)
-        x, middle, self._half = sums.scaled
-        wave, pieces = np.exp(2j * np.pi * frequency * (sums.at - middle))[:, None], len(x)
-        self._rest, self._base, self._twice = (
-            sums.cardinal @ (wave**power * values.reshape(pieces, -1))
-            for values, power in ((sums.rest, 1), (sums.base, 1), (sums.gains, 2))
-        )
-
-    def explained(self, frequencies: Floats) -> Floats:
-        """Return squares explained by waves of given frequencies, shape (m,)."""
-        many, d = len(frequencies), self._directions
-        turned = np.exp(2j * np.pi * self._half * np.outer(frequencies - self._frequency, NODES))
-        rest = sides((turned @ self._rest).conj())
-        base = sides((turned @ self._base).conj()).reshape(many, 2, d, -1)
-        return solved(rest, taken(base), squares(self._mean, (turned**2 @ self._twice).conj().reshape(many, d, d)))
-
-
-REACH = 0.55
-"""Largest distance from the central frequency, in waves over the extent."""
-
-NODES = np.cos(np.pi * (np.arange(24) + 0.5) / 24)
-"""Chebyshev points, shape (24,): J_24(2 pi REACH) is below 2e-17."""
 
 
 def sides(transform: NDArray[np.complex128]) -> Floats:

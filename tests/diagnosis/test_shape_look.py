@@ -10,7 +10,6 @@ import pytest
 from dbbstation.diagnosis.shapes import BALL, EVERY, PLAUSIBLE_MM, READING, TABLE, TOOL, Samples
 from dbbstation.diagnosis.unmodelled import Ranges, TemplateScan, looked_for
 from dbbstation.inference.forms import Bump, Ringing, Wave
-from dbbstation.inference.looks import REACH, NearbyWaves
 from dbbstation.inference.square_root import Columns
 
 NOISE_MM = 5e-4
@@ -107,17 +106,6 @@ def test_a_ball_that_moves_in_three_directions_is_explained_alike():
     )
     (explained,) = sums.explained(form.columns(sums.at)[:, None, :])
     assert explained == pytest.approx(by_brute_force(base, read, columns), rel=1e-6)
-
-
-@pytest.mark.parametrize(("strut", "moves"), [(None, BALL), (4, EVERY)])
-def test_waves_near_a_frequency_explain_what_their_curves_do(strut, moves):
-    rng = np.random.default_rng(7)
-    _, _, _, look = problem(rng, lambda run: 1e-3 * run.gain[BALL][:, 1] * np.sin(2 * np.pi * run.values["time"] / 7.1))
-    sums = look.sums("time", strut, moves, lambda values: np.round(values * SAMPLES).astype(np.int64))
-    near = 1 / 7.0
-    frequencies = near + REACH / np.ptp(sums.at) * np.linspace(-1.0, 1.0, 9)
-    curves = np.stack([Wave(frequency).columns(sums.at) for frequency in frequencies], axis=1)
-    assert NearbyWaves(sums, near).explained(frequencies) == pytest.approx(sums.explained(curves), rel=1e-9)
 
 
 @pytest.mark.parametrize(

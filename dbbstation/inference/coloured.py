@@ -17,10 +17,11 @@ from scipy.sparse import csr_array
 from scipy.special import gammaln
 
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.model_comparison import cholesky
 from dbbstation.inference.triangle import norms
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Floats, Integers
 
@@ -369,7 +370,6 @@ class Left:
     Attributes:
         axes: orthonormal fitted directions, reduced by priors, shape (n, k).
         whitening: shape (n, n), or None.
-        known: `beside` if already computed, shape (n, k).
     """
 
     rest: Floats
@@ -377,7 +377,28 @@ class Left:
     noise: float
     coloured: Coloured
     whitening: csr_array | None
-    known: Floats | None = None
+
+    @classmethod
+    def of(cls, columns: Floats, sd: Floats, target: Floats, coloured: Coloured, whitening: csr_array | None) -> Left:
+        """Return the residual of a whitened target, shape (n,), beside whitened columns, shape (n, k), with Gaussian priors.
+
+        Args:
+            sd: of the priors, shape (k,); infinite if unknown.
+        """
+        noise = coloured.innovation
+        size = np.where(np.isfinite(sd), sd, noise / norms(columns))
+        rows = np.vstack([columns * (size / noise), np.eye(len(sd))[np.isfinite(sd)]])
+        axes, weighted = np.linalg.qr(rows)[0][: len(columns)], target / noise
+        return cls(weighted - axes @ (axes.T @ weighted), axes, noise, coloured, whitening)
+
+    def also(self, columns: Floats, sd: Floats) -> Left:
+        """Return the residual beside further whitened columns, shape (n, q), with finite priors [Woodbury]."""
+        own = columns * (sd / self.noise)
+        beside = own - self.axes @ (self.axes.T @ own)
+        root = cholesky(own.T @ beside + np.eye(len(sd)))
+        axes = np.linalg.solve(root, beside.T).T
+        rest = self.rest - axes @ np.linalg.solve(root, own.T @ self.rest)
+        return replace(self, rest=rest, axes=np.hstack([self.axes, axes]))
 
     @cached_property
     def towards(self) -> Floats:
@@ -387,7 +408,7 @@ class Left:
     @cached_property
     def beside(self) -> Floats:
         """Return the transposed whitening times `axes`, for products with unwhitened columns, shape (n, k)."""
-        return self.transposed(self.axes) if self.known is None else self.known
+        return self.transposed(self.axes)
 
     def whitened(self, rows: Floats) -> Floats:
         """Return whitened rows."""
@@ -414,83 +435,6 @@ class Left:
     def transposed(self, rows: Floats) -> Floats:
         """Return the transposed whitening times rows."""
         return rows if self.whitening is None else self.whitening.T @ rows
-
-
-@dataclass(frozen=True, eq=False)
-class Fitting:
-    """Orthonormal basis of whitened columns with Gaussian priors.
-
-    Attributes:
-        axes: orthonormal basis over rows and one row per prior, shape (n + b, k).
-    """
-
-    axes: Floats
-    rows: int
-    coloured: Coloured
-    whitening: csr_array | None
-
-    @classmethod
-    def of(cls, columns: Floats, sd: Floats, coloured: Coloured, whitening: csr_array | None) -> Fitting:
-        """Return basis of whitened columns, shape (n, k), with Gaussian priors; unknown priors are infinite."""
-        noise = coloured.innovation
-        size = np.where(np.isfinite(sd), sd, noise / norms(columns))
-        rows = np.vstack([columns * (size / noise), np.eye(len(sd))[np.isfinite(sd)]])
-        return cls(np.linalg.qr(rows)[0], len(columns), coloured, whitening)
-
-    def without_axes(self, columns: Floats) -> Floats:
-        """Subtract from columns over noise, shape (n, k), their projection on `axes`; return shape (n + b, k)."""
-        new = np.vstack([columns, np.zeros((len(self.axes) - self.rows, columns.shape[1]))])
-        for _ in range(2):  # twice is enough [Giraud et al., Numer. Math. 101 (2005) 87]
-            new = new - self.axes @ (self.axes.T @ new)
-        return new
-
-    def left(self, target: Floats) -> Left:
-        """Return the residual of a whitened target, shape (n,)."""
-        noise, axes = self.coloured.innovation, self.axes[: self.rows]
-        weighted = target / noise
-        return Left(weighted - axes @ (axes.T @ weighted), axes, noise, self.coloured, self.whitening)
-
-
-class LeftBesideOthers:
-    """Residuals of a fit with all groups of columns but one."""
-
-    def __init__(
-        self,
-        fitting: Fitting,
-        sd: Floats,
-        target: Floats,
-        whitened: Callable[[Floats], Floats],
-    ) -> None:
-        self._fitting, self._target, self._whitened = fitting, target, whitened
-        self._size = sd / fitting.coloured.innovation
-        self._alone = fitting.left(target)
-        self._own = np.zeros((0, len(sd)))
-        self._new = np.zeros((len(fitting.axes), len(sd)))
-        self._transposed = np.zeros((fitting.rows, len(sd)))
-        self._products = np.eye(len(sd))
-
-    def __call__(self, but_for: int, own: Floats) -> Left:
-        """Return the residual of the fit without one group of unwhitened columns, shape (n, k)."""
-        changed = np.arange(own.shape[1])
-        if len(self._own):
-            changed = np.flatnonzero((own != self._own).any(axis=0))
-        if len(changed):
-            self._own = own.copy()
-            new = self._fitting.without_axes(self._whitened(own[:, changed]) * self._size[changed])
-            self._new[:, changed], self._transposed[:, changed] = new, self._alone.transposed(new[: self._fitting.rows])
-            self._products[changed] = new.T @ self._new
-            self._products[:, changed] = self._products[changed].T
-            self._products[changed, changed] += 1.0
-        alone, others = self._alone, np.delete(np.arange(own.shape[1]), but_for)
-        root = np.linalg.inv(np.linalg.cholesky(self._products[np.ix_(others, others)])).T
-        axes = self._new[: self._fitting.rows, others] @ root
-        beside = self._transposed[:, others] @ root
-        return replace(
-            alone,
-            rest=alone.rest - axes @ (axes.T @ self._target) / alone.noise,
-            axes=np.hstack([alone.axes, axes]),
-            known=np.hstack([alone.beside, beside]),
-        )
 
 
 GROWN = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])

@@ -6,6 +6,7 @@ Sums over bins of a variable give the squares that curves explain, quickly.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,7 @@ from scipy.sparse import csr_array
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Kind, Variable
-from dbbstation.inference.coloured import Fitting, Left, LeftBesideOthers
+from dbbstation.inference.coloured import Left
 from dbbstation.inference.forms import HARMONICS, Bump, Form, Spline, StepForm, Wave
 from dbbstation.inference.patterns import CURVES, Family, Pattern, log_odds
 from dbbstation.inference.square_root import free_directions
@@ -371,7 +372,12 @@ def _fitted(bank: Bank, members: Sequence[Member]) -> tuple[Floats, Floats]:
 
 
 def _left(bank: Bank, columns: Floats, sd: Floats) -> Left:
-    return Fitting.of(columns, sd, bank.noise, bank.whitening).left(bank.target)
+    return Left.of(columns, sd, bank.target, bank.noise, bank.whitening)
+
+
+def _left_but_for(bank: Bank, left: Left, sd: Floats, but_for: int, own: Floats) -> Left:
+    """Return the residual also beside all of a pattern's columns, shape (n, k), but one."""
+    return left.also(bank.whitened(np.delete(own, but_for, axis=1)), np.delete(sd, but_for))
 
 
 def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) -> tuple[Member, ...]:
@@ -388,8 +394,7 @@ def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) ->
         if pattern.family in PLACED:
             better = placed_better(pattern, _left(bank, others, sd), channel.kept, size)
         else:
-            fitting = Fitting.of(others, sd, bank.noise, bank.whitening)
-            lefts = LeftBesideOthers(fitting, member.sd[:count], bank.target, bank.whitened)
+            lefts = partial(_left_but_for, bank, _left(bank, others, sd), member.sd[:count])
             better = refined(pattern, count, lefts, channel, size)
         if better.name == pattern.name or better.name in bank.patterns:
             continue

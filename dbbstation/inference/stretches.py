@@ -144,11 +144,10 @@ class _Look:
         self._rows, self._at = np.flatnonzero(kept), self._clock.rows[kept]
         ends = np.searchsorted(self._rows, [[b.start, b.stop] for b in channel.blocks])
         self._blocks = [(int(a), int(b)) for a, b in ends if b - a >= 2 * SHORTEST]
-        self._axes, self._rest = _Growing(left.axes), left.rest
         self._whole = _cumulative(left.whitened(factor) ** 2)
         self._edges = _squares_of_edges(left.coloured, len(self._rows))
-        self._along_axes = _Growing(_cumulative(factor[:, None] * left.beside))
-        self._lengths = _squares(self._along_axes.columns)
+        self._along_axes = _cumulative(factor[:, None] * left.beside)
+        self._lengths = _squares(self._along_axes)
         self._total = _cumulative(factor * left.towards)
         self._windows = self._all_windows() if windows is None else windows
         self._own = self._information(self._windows[:, 0], self._windows[:, 1])
@@ -173,7 +172,7 @@ class _Look:
         return np.column_stack([starts, ends])[ends - starts < len(self._rows)]
 
     def _information(self, starts: Integers, ends: Integers) -> Floats:
-        own, along = self._whole[ends] - self._whole[starts] + self._edges[ends - starts], self._along_axes.columns
+        own, along = self._whole[ends] - self._whole[starts] + self._edges[ends - starts], self._along_axes
         for many in range(0, len(starts), BOUNDS.stretches_at_once):
             rows = slice(many, many + BOUNDS.stretches_at_once)
             own[rows] -= _squares(along[ends[rows]] - along[starts[rows]])
@@ -205,7 +204,7 @@ class _Look:
         return 0, len(self._rows)
 
     def _worth_between(self, edge: int, others: slice) -> Floats:
-        way, along = 1.0 if others.start > edge else -1.0, self._along_axes.columns
+        way, along = 1.0 if others.start > edge else -1.0, self._along_axes
         own = way * (self._whole[others] - self._whole[edge])
         own += self._edges[np.abs(np.arange(others.start, others.stop) - edge)]
         own -= self._lengths[others] - 2.0 * (along[others] @ along[edge]) + self._lengths[edge]
@@ -231,17 +230,11 @@ class _Look:
     def take(self, window: _Window) -> tuple[float, float]:
         """Add a stretch and return its edges in rows."""
         begins, ends = self.edges_of(window)
-        column = self._left.whitened(self._columns(np.array([begins]), np.array([ends])))[:, 0]
-        axes = self._axes.columns
-        beside = column - axes @ (axes.T @ column)
-        # The prior leaves part of the explained residual; the result equals a joint fit [Woodbury].
-        information = max(float(column @ beside), 0.0) + 1.0 / self._size**2
-        self._rest = self._rest - beside * (float(column @ self._rest) / information)
-        axis = beside / np.sqrt(information)
-        self._axes.add(axis)
-        self._total = _cumulative(self._factor * self._left.transposed(self._rest))
-        total = _cumulative(self._factor * self._left.transposed(axis))
-        self._along_axes.add(total)
+        column = self._left.whitened(self._columns(np.array([begins]), np.array([ends])))
+        self._left = self._left.also(column, np.array([self._size * self._left.noise]))
+        self._total = _cumulative(self._factor * self._left.towards)
+        total = _cumulative(self._factor * self._left.transposed(self._left.axes[:, -1]))
+        self._along_axes = np.column_stack([self._along_axes, total])
         self._lengths = self._lengths + total**2
         self._own = self._own - (total[self._windows[:, 1]] - total[self._windows[:, 0]]) ** 2
         return begins, ends
@@ -259,8 +252,8 @@ class _Look:
         columns = columns - columns[:, :1]
         near = slice(about.start, min(about.stop + rings, len(self._at)) if len(columns) else about.start)
         away = self._left.whitened_part(columns, about, near)
-        axes, inside = self._axes.columns, slice(near.start - there.start, near.stop - there.start)
-        along = one.T @ self._rest[there] + away.T @ self._rest[near]
+        axes, inside = self._left.axes, slice(near.start - there.start, near.stop - there.start)
+        along = one.T @ self._left.rest[there] + away.T @ self._left.rest[near]
         taken = axes[there].T @ one + axes[near].T @ away
         own = np.sum(one**2) + np.sum(away**2, axis=0) - np.sum(taken**2, axis=0)
         if len(away):
@@ -277,22 +270,6 @@ class _Look:
     def _columns(self, begins: Floats, ends: Floats, rows: slice = slice(None)) -> Floats:
         at = self._at[rows, None]
         return (self._clock.response(at - begins) - self._clock.response(at - ends)) * self._factor[rows, None]
-
-
-class _Growing:
-    """Columns, shape (n, k), with room to append without copies."""
-
-    def __init__(self, columns: Floats) -> None:
-        self.columns, self._room = columns, columns
-
-    def add(self, column: Floats) -> None:
-        """Add a column, shape (n,)."""
-        count = self.columns.shape[1]
-        if count == self._room.shape[1]:
-            self._room = np.empty((len(column), count + BOUNDS.stretches))
-            self._room[:, :count] = self.columns
-        self._room[:, count] = column
-        self.columns = self._room[:, : count + 1]
 
 
 INDEPENDENT = 4.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.inference.channel import Kind, Variable
-from dbbstation.inference.coloured import Coloured, Fitting
+from dbbstation.inference.coloured import Coloured, Left
 from dbbstation.inference.looks import looked_for
 from dbbstation.inference.patterns import Family
 
@@ -16,7 +16,7 @@ def test_a_wave_of_which_only_a_multiple_is_strong_is_sought_with_its_pitch(rng,
     """A screw of 10 mm pitch over 100 mm, whose error has one harmonic far above the noise."""
     place = np.sort(rng.uniform(0.0, 100.0, 2000))
     residual = 3.0 * np.sin(2 * np.pi * multiple * place / 10.0) + rng.standard_normal(2000)
-    left = Fitting.of(np.ones((2000, 1)), np.array([np.inf]), Coloured(1.0), None).left(residual)
+    left = Left.of(np.ones((2000, 1)), np.array([np.inf]), residual, Coloured(1.0), None)
     screw = Variable("screw", "mm", Kind.LENGTH, place)
     found = looked_for(left, [screw], np.ones(2000, dtype=bool), 10.0)
     forms = [pattern.form for pattern in found if pattern.family is Family.WAVE]

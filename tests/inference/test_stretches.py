@@ -11,7 +11,7 @@ from scipy.stats import t as student_t
 
 from dbbstation.inference.bank import Bank
 from dbbstation.inference.channel import Base, Channel
-from dbbstation.inference.coloured import Coloured, Fitting, Left, LeftBesideOthers, akaike_cost
+from dbbstation.inference.coloured import Coloured, Left, akaike_cost
 from dbbstation.inference.forms import Clock, Stretches
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.settle import settle
@@ -155,25 +155,23 @@ def test_what_is_left_beside_columns_is_ridge_regression(rng):
     columns, target, noise = rng.normal(size=(80, 6)), rng.normal(size=80), 0.7
     columns[:, 4] += 3.0 * columns[:, 0]
     sd = np.array([np.inf, np.inf, 1.0, 0.1, 3.0, np.inf])
-    left = Fitting.of(columns, sd, Coloured(noise), None).left(target)
+    left = Left.of(columns, sd, target, Coloured(noise), None)
     precision = np.diag(np.where(np.isfinite(sd), 1.0 / sd**2, 0.0))
     values = np.linalg.solve(columns.T @ columns / noise**2 + precision, columns.T @ target / noise**2)
     np.testing.assert_allclose(left.rest, (target - columns @ values) / noise, atol=1e-12)
 
 
-def test_what_is_left_beside_all_columns_but_one_is_ridge_regression(rng):
+def test_what_is_left_beside_further_columns_is_ridge_regression(rng):
     rows, noise = 60, Coloured.first_order(0.7, 0.6, 0.8)
     whitening = noise.whitening([slice(0, rows)])
     dense, level = whitening.toarray(), noise.innovation
     base, columns, target = rng.normal(size=(rows, 2)), rng.normal(size=(rows, 4)), dense @ rng.normal(size=rows)
     columns[:, 3] = 0.0
     sd = np.array([np.inf, np.inf, 0.3, 1.0, 1.0, 0.5])
-    fitting = Fitting.of(dense @ base, sd[:2], noise, whitening)
-    lefts = LeftBesideOthers(fitting, sd[2:], target, lambda own: dense @ own)
-    for but_for in range(4):
-        left = lefts(but_for, columns)
-        used = np.delete(np.arange(6), 2 + but_for)
+    for but_for in range(2, 6):
+        used = np.delete(np.arange(6), but_for)
         whole = dense @ np.hstack([base, columns])[:, used]
+        left = Left.of(whole[:, :2], sd[:2], target, noise, whitening).also(whole[:, 2:], sd[used][2:])
         inverse = np.linalg.inv(
             whole.T @ whole / level**2 + np.diag(np.where(np.isfinite(sd[used]), 1.0 / sd[used] ** 2, 0.0))
         )
@@ -181,7 +179,6 @@ def test_what_is_left_beside_all_columns_but_one_is_ridge_regression(rng):
         np.testing.assert_allclose(left.rest, (target - taken @ target) / level, atol=1e-11)
         np.testing.assert_allclose(left.axes @ left.axes.T, taken, atol=1e-11)
         np.testing.assert_allclose(left.beside, dense.T @ left.axes, atol=1e-11)
-        columns[:, but_for] = rng.normal(size=rows)
 
 
 @pytest.mark.parametrize(

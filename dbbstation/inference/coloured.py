@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array
+from scipy.sparse.linalg import spsolve_triangular
 from scipy.special import gammaln
 
 from dbbstation.inference.bounds import BOUNDS
@@ -180,27 +181,8 @@ class Coloured:
 
     def unwhitened(self, white: Floats, stretches: Sequence[slice]) -> Floats:
         """Return the rows, shape (n,), that whitening maps to the given ones."""
-        if self.is_white:
-            return white
-        coefficients, left = self._predictors
-        most, found = len(coefficients) - 1, np.empty(len(white))
-        for stretch in stretches:
-            own, new = found[stretch], white[stretch]
-            begun = min(most, len(own))
-            for k in range(begun):
-                own[k] = new[k] / np.sqrt(left[-1] / left[k]) + coefficients[k] @ own[:k][::-1]
-            if len(own) > most:
-                from scipy.signal import lfilter  # noqa: PLC0415 - takes half a second; many commands measure no colour
-
-                state = _state(self.filter, own[:most])
-                own[most:] = lfilter([1.0], self.filter, new[most:], zi=state)[0]
-        return found
-
-
-def _state(taps: Floats, before: Floats) -> Floats:
-    order = len(taps) - 1
-    recent = before[::-1]
-    return np.array([-(taps[k + 1 :] @ recent[: order - k]) for k in range(order)])
+        whitening = self.whitening(stretches)
+        return white if whitening is None else spsolve_triangular(whitening, white)
 
 
 def _longer(coefficients: Floats, partial: float) -> Floats:

@@ -32,7 +32,7 @@ SCALES = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
 LOG_SCALE_WEIGHTS = np.log([0.19, 0.19, 0.19, 0.19, 0.19, 0.05])
 """Prior probabilities of `SCALES`: log-uniform over two decades up to the plausible size, one in twenty beyond."""
 
-NO_SLACK = np.zeros(0)
+NO_SLACK, NO_COLUMNS = np.zeros(0), np.zeros(0, dtype=np.int64)
 
 
 SLACK_SHARES = ((0.1, 0.1), (0.1, 1.0), (1.0, 1.0))
@@ -73,9 +73,9 @@ class Variant:
     nonlinear: tuple[float, ...] = ()
     label: str = ""
     law: str = ""
-    whole: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    whole: Integers = field(default_factory=lambda: NO_COLUMNS)
     log_weight: float = 0.0
-    slack: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    slack: Integers = field(default_factory=lambda: NO_COLUMNS)
     slack_sd: Floats = field(default_factory=lambda: NO_SLACK)
     slack_at: float = 1.0
     tangents: int = 0
@@ -227,28 +227,6 @@ class Estimates:
     covariance: Floats
 
 
-class _OfCause:
-    """Forms of one cause by number of amplitudes.
-
-    Attributes:
-        groups: for each p, forms, shape (m,); columns and plausible sizes, shape (m, p) each; products, shape (m, p, p).
-    """
-
-    def __init__(self, cause: Cause, gram: Floats, at: Callable[[Integers], Integers]) -> None:
-        by_size: dict[int, list[int]] = {}
-        for number, variant in enumerate(cause.variants):
-            by_size.setdefault(len(variant.columns), []).append(number)
-        self.cause = cause
-        self.groups: dict[int, _Group] = {}
-        for size, numbers in by_size.items():
-            columns = at(np.array([cause.variants[number].columns for number in numbers]))
-            plausible = np.array([cause.variants[number].plausible for number in numbers])
-            blocks = gram[columns[:, :, None], columns[:, None, :]]
-            self.groups[size] = np.array(numbers), columns, plausible, blocks
-        self.weights = np.array([variant.log_weight for variant in cause.variants])
-        self.slim = [i for i, v in enumerate(cause.variants) if len(v.columns) < BOUNDS.flexible]
-
-
 class _Forms:
     """Forms of causes by number of amplitudes.
 
@@ -258,25 +236,23 @@ class _Forms:
         weights: log probability of each form within its cause.
     """
 
-    def __init__(self, each: Sequence[_OfCause], count: int) -> None:
-        self.causes = tuple(one.cause for one in each)
-        self.ends = np.cumsum([0, *(len(one.weights) for one in each)])
-        self.weights = np.concatenate([np.zeros(0), *(one.weights for one in each)])
-        self.slim = [one.slim for one in each]
-        of_sizes: dict[int, list[_Group]] = {}
-        wanted = np.zeros(count, dtype=bool)
-        for one, first in zip(each, self.ends[:-1], strict=True):
-            for size, (numbers, columns, plausible, blocks) in one.groups.items():
-                of_sizes.setdefault(size, []).append((numbers + first, columns, plausible, blocks))
-                wanted[columns] = True
-        self.needed: Integers = np.flatnonzero(wanted)
-        place = np.zeros(count, dtype=np.int64)
+    def __init__(self, causes: tuple[Cause, ...], gram: Floats, at: Callable[[Integers], Integers]) -> None:
+        forms = [variant for cause in causes for variant in cause.variants]
+        self.causes, self.ends = causes, np.cumsum([0, *(len(cause.variants) for cause in causes)])
+        self.weights = np.array([form.log_weight for form in forms])
+        self.slim = [[k for k, v in enumerate(c.variants) if len(v.columns) < BOUNDS.flexible] for c in causes]
+        by_size: dict[int, list[int]] = {}
+        for number, form in enumerate(forms):
+            by_size.setdefault(len(form.columns), []).append(number)
+        of_sizes = {size: at(np.array([forms[k].columns for k in some])) for size, some in by_size.items()}
+        self.needed: Integers = np.unique(np.concatenate([NO_COLUMNS, *(part.ravel() for part in of_sizes.values())]))
+        place = np.zeros(len(gram), dtype=np.int64)
         place[self.needed] = np.arange(len(self.needed))
         self.groups: list[_Group] = []
-        for parts in of_sizes.values():
-            numbers, columns = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
-            plausible, blocks = (np.concatenate([part[k] for part in parts]) for k in (2, 3))
-            self.groups.append((numbers, place[columns], plausible, blocks))
+        for size, columns in of_sizes.items():
+            plausible = np.array([forms[k].plausible for k in by_size[size]])
+            blocks = gram[columns[:, :, None], columns[:, None, :]]
+            self.groups.append((np.array(by_size[size]), place[columns], plausible, blocks))
 
 
 class ModelComparison:
@@ -298,13 +274,12 @@ class ModelComparison:
         self._gram, self._towards = gram, towards
         self._columns, self._evidence = columns, evidence
         self._last: tuple[tuple[Member, ...], _Eliminated] | None = None
-        self._of_causes: dict[str, _OfCause] = {}
         self._forms: dict[str, _Forms] = {}
 
     def among(self, causes: Iterable[Cause]) -> ModelComparison:
         """Return the comparison of some causes, in contiguous arrays."""
         every = [part for cause in causes for one in cause.variants for part in (one.columns, one.slack)]
-        columns = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *every]))
+        columns = np.unique(np.concatenate([NO_COLUMNS, *every]))
         own = self._at(columns)
         return ModelComparison(_square(self._gram, own), self._towards[own], columns, self._evidence)
 
@@ -446,18 +421,11 @@ class ModelComparison:
         return information
 
     def _forms_of(self, causes: tuple[Cause, ...]) -> _Forms:
-        each = [self._of_cause(cause) for cause in causes]
         key = causes[0].name if len(causes) == 1 else ""
         known = self._forms.get(key)
         if known is None or list(map(id, known.causes)) != list(map(id, causes)):
-            known = self._forms[key] = _Forms(each, len(self._gram))
+            known = self._forms[key] = _Forms(causes, self._gram, self._at)
         return known
-
-    def _of_cause(self, cause: Cause) -> _OfCause:
-        one = self._of_causes.get(cause.name)
-        if one is None or one.cause is not cause:
-            one = self._of_causes[cause.name] = _OfCause(cause, self._gram, self._at)
-        return one
 
     def _eliminated(self, members: Sequence[Member]) -> _Eliminated:
         if not members:
@@ -642,7 +610,7 @@ def slices_of(members: Sequence[Member], first: int = 0) -> list[slice]:
 
 def all_columns(each: Iterable[Member | Variant]) -> Integers:
     """Return the columns of members, or of forms without slack, shape (p,)."""
-    return np.concatenate([np.zeros(0, dtype=np.int64), *(one.columns for one in each)])
+    return np.concatenate([NO_COLUMNS, *(one.columns for one in each)])
 
 
 def _stacked(members: Sequence[Member]) -> tuple[Integers, Floats]:

@@ -407,10 +407,9 @@ def grown(
         if m.name in there and any(v is m.variant for v in there[m.name].variants)
     ]
     while len(members) < BOUNDS.grown:
-        taken = {member.name for member in members}
         if work is not None:
             work.scan(causes)
-        scan = comparison.scan(members, [cause for cause in causes if cause.name not in taken])
+        scan, _ = comparison.around(members, causes).without(())
         if not scan.causes:
             break
         k = int(scan.log_odds.argmax())

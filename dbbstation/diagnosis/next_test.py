@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,13 +26,12 @@ from dbbstation.sources.contract import Motion, Need, Setup
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from dbbstation.computing.arrays import Floats, Integers
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.effects import WorkspaceError
     from dbbstation.diagnosis.explain import Explained
     from dbbstation.diagnosis.findings import SourceFinding
     from dbbstation.inference.model_comparison import Variant
-    from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
@@ -73,37 +72,14 @@ class Proposal:
         return ", ".join(parts)
 
 
-_Form: TypeAlias = tuple[str, str, tuple[float, ...], float]
-"""Name of a source, its law, nonlinear parameters, and waiting time before the run if it depends on time [s]."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Run:
-    """One direction of a proposal, with its mounting eliminated.
-
-    Attributes:
-        ball: orthonormal effects of ball shifts, shape (n, 3).
-        weight: number of samples represented by a row.
-        base: rows over base columns, shape (n, t).
-        of_sources: rows over amplitudes, by form and waiting time, shape (n, p).
-    """
-
-    ball: Floats
-    weight: float
-    touched: Integers
-    base: Floats
-    of_sources: dict[_Form, Floats] = field(default_factory=dict)
-
-
 class ForeseenTests:
-    """Possible tests of a channel, each computed once."""
+    """Possible tests of a channel."""
 
     def __init__(self, channel: CircleChannel) -> None:
         self.channel = channel
         self._ends_s = _ends_s(channel)
         self._samples = float(np.mean([len(o.raw) for o in channel.observations]))
         self._is_reachable = cache(lambda circle: is_within_travel(channel.machine, circle.envelope(step_deg=15.0)))
-        self._runs: dict[tuple[Circle, float, str], _Run] = {}
 
     def that_show(self, needs: Collection[Need]) -> list[Proposal]:
         """Return reachable circles about the plan's balls that can show sources with these inputs."""
@@ -136,58 +112,28 @@ class ForeseenTests:
         return found
 
     def rows(
-        self,
-        proposal: Proposal,
-        direction: Direction,
-        asked: Sequence[tuple[ErrorSource, Variant]],
-    ) -> tuple[Integers, Floats]:
-        """Return the columns of base and sources that a run shows, shape (q,), and its compressed rows over them, (r, q).
+        self, proposal: Proposal, directions: Sequence[Direction], asked: Sequence[tuple[ErrorSource, Variant]]
+    ) -> Floats:
+        """Return compressed rows of a proposal's runs over the columns of base, then sources, shape (r, k).
 
-        Its new mounting is eliminated.
+        Its new mountings are eliminated.
         """
-        run = self._run(proposal, direction, asked)
-        place = len(self.channel.base.prior)
-        touched, parts = [run.touched], [run.base]
-        for source, variant in asked:
-            own = run.of_sources[_form(proposal, source, variant)]
-            seen = np.flatnonzero(np.any(own != 0.0, axis=0))
-            touched.append(place + seen)
-            parts.append(own[:, seen])
-            # Values of other sessions and mountings do not affect this run.
-            place += len(variant.columns)
-        return np.concatenate(touched), np.asarray(np.linalg.qr(np.hstack(parts), mode="r"))
-
-    def _run(self, proposal: Proposal, direction: Direction, asked: Sequence[tuple[ErrorSource, Variant]]) -> _Run:
-        wait_s = proposal.wait_s if Need.TIME in self.channel.calibration.layout.needs else 0.0
-        key = replace(proposal.circle, direction=direction), wait_s, proposal.observation.setup.ball
-        run = self._runs.get(key)
-        if run is None or any(_form(proposal, *one) not in run.of_sources for one in asked):
-            reading = MachineModel(self.channel.machine).bar(_motion(proposal, direction, self._ends_s))
-            run = self._runs[key] = run or self._of_base(reading)
+        machine, layout, found = self.channel.machine, self.channel.calibration.layout, []
+        for direction in directions:
+            reading = MachineModel(machine).bar(_motion(proposal, direction, self._ends_s))
+            parts = [by_terms(reading, layout, layout.nominal)]
             for source, variant in asked:
-                form = _form(proposal, source, variant)
-                if form not in run.of_sources:
-                    derivative = by_amplitudes(reading, source, self.channel.machine, variant.nonlinear)
-                    run.of_sources[form] = _without(run.ball, derivative) * run.weight
-        return run
-
-    def _of_base(self, reading: BarReading) -> _Run:
-        motion = reading.actual.motion
-        ball, _ = np.linalg.qr(reading.sensitivity.direction[motion.kept])
-        layout = self.channel.calibration.layout
-        rows = by_terms(reading, layout, layout.nominal)
-        touched = np.flatnonzero(np.any(rows != 0.0, axis=0))
-        weight = float(np.sqrt(self._samples / len(rows)))
-        return _Run(ball, weight, touched, _without(ball, rows[:, touched]) * weight)
-
-
-def _form(proposal: Proposal, source: ErrorSource, variant: Variant) -> _Form:
-    wait_s = proposal.wait_s if Need.TIME in source.needs else 0.0
-    return source.name, source.law, variant.nonlinear, wait_s
-
-
-def _without(ball: Floats, rows: Floats) -> Floats:
-    return rows - ball @ (ball.T @ rows)
+                own = by_amplitudes(reading, source, machine, variant.nonlinear)
+                # Values of other sessions and mountings do not affect this run.
+                parts.append(np.pad(own, ((0, 0), (0, len(variant.columns) - own.shape[1]))))
+            rows = np.hstack(parts)
+            ball, _ = np.linalg.qr(reading.sensitivity.direction[reading.actual.motion.kept])
+            # Each row represents several samples.
+            rows = (rows - ball @ (ball.T @ rows)) * float(np.sqrt(self._samples / len(rows)))
+            seen = np.flatnonzero(rows.any(axis=0))
+            found.append(np.zeros((min(len(rows), len(seen)), rows.shape[1])))
+            found[-1][:, seen] = np.linalg.qr(rows[:, seen], mode="r")
+        return np.vstack(found)
 
 
 def _ends_s(channel: CircleChannel) -> float:
@@ -276,22 +222,19 @@ def propose(
     covariance = solve(blocks, known, noise_mm, channel.held).covariance
     own = slice(first, first + len(variant.columns))
 
-    def seen(proposal: Proposal, runs: slice) -> _Rows:
-        return _stacked([could_be.rows(proposal, direction, asked) for direction in tuple(Direction)[runs]])
-
-    def left(rows: _Rows) -> float:
+    def left(rows: Floats) -> float:
         return _size(_told(covariance, rows, noise_mm, own), variant)
 
     proposals = could_be.that_show(frozenset[Need]().union(*(s.needs for s, _ in asked)))
     # One direction suffices to select the tests for closer evaluation.
-    one_way = {k: seen(proposal, slice(1)) for k, proposal in enumerate(proposals)}
-    both_ways: dict[int, _Rows] = {}
+    one_way = {k: could_be.rows(proposal, [*Direction][:1], asked) for k, proposal in enumerate(proposals)}
+    both_ways: dict[int, Floats] = {}
     chosen: list[Proposal] = []
     sigmas = [_sigmas(covariance[own, own], variant)]
     for _ in range(min(BOUNDS.proposed, len(one_way))):
         closer = sorted(one_way, key=lambda k: left(one_way[k]))[: BOUNDS.closer_look]
         for k in closer:
-            both_ways.setdefault(k, seen(proposals[k], slice(None)))
+            both_ways.setdefault(k, could_be.rows(proposals[k], [*Direction], asked))
         _, k = min((left(both_ways[k]), k) for k in closer)
         del one_way[k]
         covariance = _told(covariance, both_ways[k], noise_mm, slice(None))
@@ -307,24 +250,9 @@ def propose(
     return ()
 
 
-_Rows: TypeAlias = tuple["Integers", "Floats"]
-"""Columns of base and sources, shape (q,), and rows over them, (r, q)."""
-
-
-def _stacked(several: Sequence[_Rows]) -> _Rows:
-    columns = np.unique(np.concatenate([own for own, _ in several]))
-    stacked = []
-    for own, rows in several:
-        wide = np.zeros((len(rows), len(columns)))
-        wide[:, np.searchsorted(columns, own)] = rows
-        stacked.append(wide)
-    return columns, np.vstack(stacked)
-
-
-def _told(covariance: Floats, shown: _Rows, noise_mm: float, own: slice) -> Floats:
-    columns, rows = shown
-    seen = np.flatnonzero(rows.any(axis=0))
-    columns, rows = columns[seen], rows[:, seen]
+def _told(covariance: Floats, rows: Floats, noise_mm: float, own: slice) -> Floats:
+    columns = np.flatnonzero(rows.any(axis=0))
+    rows = rows[:, columns]
     gain = rows @ covariance[columns, own]
     answer = rows @ covariance[np.ix_(columns, columns)] @ rows.T + noise_mm**2 * np.eye(len(rows))
     return covariance[own, own] - gain.T @ np.linalg.solve(answer, gain)

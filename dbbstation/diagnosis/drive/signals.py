@@ -22,7 +22,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt, label
+from scipy.ndimage import distance_transform_edt, label, maximum_filter1d
 from scipy.signal import butter, savgol_filter, sosfiltfilt, welch
 
 from dbbstation.diagnosis.drive.sampling import (
@@ -84,9 +84,7 @@ def half_window(noise_m: float, rate_hz: float, allowed_m_s: float, most: int) -
 
 def within(marked: Flags, by: int) -> Flags:
     """Mark samples within `by` samples of marked ones, shape (n,)."""
-    count = np.concatenate([[0], np.cumsum(marked)])
-    at = np.arange(len(marked))
-    return count[np.minimum(at + by + 1, len(marked))] > count[np.maximum(at - by, 0)]
+    return maximum_filter1d(marked, 2 * by + 1, mode="constant")
 
 
 def weights(unknown: Flags, rise: int) -> Floats:

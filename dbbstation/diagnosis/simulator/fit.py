@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,11 +46,6 @@ class SimulatorFit:
     columns: Floats
 
 
-def plain(rows: Floats) -> Floats:
-    """Return rows unchanged."""
-    return rows
-
-
 def directions_of(work: SimulationRuns, state: FittedState) -> list[PerturbedParameter]:
     """Return a state's parameters with first doses within bounds."""
     low, high = bounds_of(work, state)
@@ -86,11 +80,10 @@ def bounds_of(work: SimulationRuns, state: FittedState) -> tuple[Floats, Floats]
 def fit(
     work: SimulationRuns,
     start: FittedState,
-    weigh: Weigh = plain,
+    weigh: Weigh = lambda rows: rows,
     *,
     sigma: float = 0.0,
     several: bool = False,
-    most_steps: int = BOUNDS.fit_steps,
 ) -> SimulatorFit:
     """Fit all parameters [Branch, Coleman and Li, SIAM J. Sci. Comput. 21 (1999) 1].
 
@@ -100,17 +93,14 @@ def fit(
     """
     begun = work.residuals([start])[0]
     sigma = sigma or rms(weigh(begun)) or 1.0
-    starts = [start, *(_elsewhere(work, start, partial(_squares, work, weigh, sigma)) if several else ())]
-    ended = [_from(work, one, weigh, sigma, most_steps) for one in starts]
-    squares = [float(np.sum(_weighed(work, state, residual, weigh, sigma) ** 2)) for state, residual in ended]
-    state, residual = ended[int(np.argmin(squares))]
+    starts = [start, *(_elsewhere(work, start, weigh, sigma) if several else ())]
+    ended = [_from(work, one, weigh, sigma) for one in starts]
+    state, residual = min(ended, key=lambda one: _square(work, *one, weigh, sigma))
     answers = work.answers(state, directions_of(work, state), rms(residual))
     return SimulatorFit(state, residual, answers.columns)
 
 
-def _from(
-    work: SimulationRuns, start: FittedState, weigh: Weigh, sigma: float, most_steps: int
-) -> tuple[FittedState, Floats]:
+def _from(work: SimulationRuns, start: FittedState, weigh: Weigh, sigma: float) -> tuple[FittedState, Floats]:
     low, high = bounds_of(work, start)
     if not len(low):
         return start, work.residuals([start])[0]
@@ -134,7 +124,7 @@ def _from(
         if about:
             before, rows_before, there = about[-1]
             said = there @ (numbers - before)
-            if _norm(rows - rows_before - said) < AGREE * _norm(said):
+            if np.linalg.norm(rows - rows_before - said) < AGREE * np.linalg.norm(said):
                 return there
         state = start.with_numbers(numbers)
         found = work.answers(state, directions_of(work, state), rms(residual(numbers)))
@@ -152,7 +142,7 @@ def _from(
         ftol=CLOSE,
         xtol=1e-10,
         gtol=1e-12,
-        max_nfev=most_steps,
+        max_nfev=BOUNDS.fit_steps,
     )
     numbers = ended.x
     return start.with_numbers(numbers), residual(numbers)
@@ -173,16 +163,11 @@ def _known(parameters: Sequence[SimulatorParameter], count: int) -> tuple[Floats
     return rows, np.array([p.value / p.uncertainty for _, p in known])  # type: ignore[operator]  # the same
 
 
-def _squares(work: SimulationRuns, weigh: Weigh, sigma: float, states: Sequence[FittedState]) -> list[float]:
-    left = work.residuals(states, strict=False)
-    return [
-        float(np.sum(_weighed(work, state, rows, weigh, sigma) ** 2)) for state, rows in zip(states, left, strict=True)
-    ]
+def _square(work: SimulationRuns, state: FittedState, residual: Floats, weigh: Weigh, sigma: float) -> float:
+    return float(np.sum(_weighed(work, state, residual, weigh, sigma) ** 2))
 
 
-def _elsewhere(
-    work: SimulationRuns, start: FittedState, squares: Callable[[Sequence[FittedState]], list[float]]
-) -> list[FittedState]:
+def _elsewhere(work: SimulationRuns, start: FittedState, weigh: Weigh, sigma: float) -> list[FittedState]:
     parameters = work.model.parameters
     if not parameters:
         return []
@@ -193,7 +178,8 @@ def _elsewhere(
 
     draws = qmc.Sobol(len(parameters), scramble=True, rng=1).random(16)[: BOUNDS.starts]
     states = [FittedState(tuple((low + (high - low) * draw).tolist()), start.terms) for draw in draws]
-    found = squares(states)
+    left = work.residuals(states, strict=False)
+    found = [_square(work, state, rows, weigh, sigma) for state, rows in zip(states, left, strict=True)]
     order = np.argsort(found)[: BOUNDS.gone_on - 1]
     return [states[int(k)] for k in order if np.isfinite(found[int(k)])]
 
@@ -260,7 +246,3 @@ def not_told_apart(names: Sequence[str], columns: Floats) -> list[tuple[str, tup
                     (name, tuple(names[others[j]] for j in np.argsort(-doing) if doing[j] > 0.1 * doing.max()))
                 )
     return found
-
-
-def _norm(values: Floats) -> float:
-    return float(np.linalg.norm(values))

@@ -82,7 +82,7 @@ def test_a_larger_input_tells_a_cubic_from_a_line_and_is_proposed(rng):
     runs = work(rng, inputs=held(rng, 200, 10, 0.2))
     cubic = Term("flow", TermForm.CUBIC, ("level",), (-0.4,))
     drag = Term("flow", TermForm.DRAG, ("level",), (-0.1,))
-    state = fit(runs, FittedState((0.5,), (cubic,)), most_steps=2).state
+    state = fit(runs, FittedState((0.5,), (cubic,))).state
     trials = trial_inputs(runs.model)
     assert trials[0].about == "the inputs as recorded"
     sigmas = {one.about: apart(runs, one, state, (cubic, drag), np.array([0.01, 0.1])) for one in trials}

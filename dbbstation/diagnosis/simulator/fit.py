@@ -95,7 +95,7 @@ def fit(
     sigma = sigma or rms(weigh(begun)) or 1.0
     starts = [start, *(_elsewhere(work, start, weigh, sigma) if several else ())]
     ended = [_from(work, one, weigh, sigma) for one in starts]
-    state, residual = min(ended, key=lambda one: _square(work, *one, weigh, sigma))
+    state, residual = min(ended, key=lambda one: _square(work, one[0], one[1], weigh, sigma))
     answers = work.answers(state, directions_of(work, state), rms(residual))
     return SimulatorFit(state, residual, answers.columns)
 

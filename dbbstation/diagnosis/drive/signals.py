@@ -18,7 +18,7 @@ Knutsson and Westin, CVPR 1993, 515, eq. 4]
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,10 +54,16 @@ EDGE_PERIODS = 3.0
 
 def low_passed(columns: Floats, rate_hz: float, cutoff_hz: float) -> Floats:
     """Low-pass columns, shape (n,) or (n, p), without phase shift; beyond the ends they are constant."""
-    bands = (cutoff_hz, POSITION_BAND * cutoff_hz)
-    sos = np.vstack([butter(ORDER, band, fs=rate_hz, output="sos") for band in bands])
+    sos = _sections(rate_hz, cutoff_hz)
     beyond = min(_reach(rate_hz, cutoff_hz), len(columns) - 1)
     return sosfiltfilt(sos, columns, axis=0, padtype="constant", padlen=beyond)
+
+
+@lru_cache(maxsize=64)
+def _sections(rate_hz: float, cutoff_hz: float) -> Floats:
+    """Second-order sections of both filters; the design takes longer than the filtering of a column."""
+    bands = (cutoff_hz, POSITION_BAND * cutoff_hz)
+    return np.vstack([butter(ORDER, band, fs=rate_hz, output="sos") for band in bands])
 
 
 def impulse_response(rate_hz: float, cutoff_hz: float) -> Floats:

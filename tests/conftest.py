@@ -8,6 +8,7 @@ import os
 import signal
 import threading
 from collections import Counter, defaultdict
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,7 @@ import pytest
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.yaml import text
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.machine.geometry import Machine
 from tests.copied import kept_loaded
 
@@ -98,6 +100,15 @@ def reference() -> Machine:
 def copies() -> Iterator[None]:
     """The process that `tests.copied` copies stands before a test begins, and is none of what the test leaves open."""
     with kept_loaded():
+        yield
+
+
+@pytest.fixture(scope="module")
+def few_parts(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Hold out four parts, the fewest that are judged, instead of ten; the nightly tests hold out all."""
+    with pytest.MonkeyPatch.context() as patch:
+        if "not nightly" in request.config.option.markexpr:
+            patch.setattr("dbbstation.inference.folds.BOUNDS", replace(BOUNDS, folds=4))
         yield
 
 

@@ -34,6 +34,6 @@ def test_what_two_formulas_may_be_off_by_is_not_decided_between_them(reference):
     (gravity,) = sources_named(["gravity"])
     truth = MachineModel(reference, (*random_kinematics(reference, 3), Fitted(gravity, np.array([60.0]))))
     plan = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
-    runs = draw_session(truth, plan, np.random.default_rng(3), 1e-4, 120)
+    runs = draw_session(truth, plan, np.random.default_rng(3), 1e-4, 60)
     found = {one.name: one for one in diagnose(reference, runs, [gravity, NearGravity()]).sources}
     assert set(found["gravity"].equivalent or found["near-gravity"].equivalent) == {"gravity", "near-gravity"}

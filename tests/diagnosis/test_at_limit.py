@@ -32,7 +32,7 @@ KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 
 OVER_TIME = ("thermal-struts", "thermal-frame", "spindle-growth", "bar-drift", "bar-scale", "jig-thermal", "backlash")
 """What a wander could be taken for, and what it could hide."""
-OVER_LENGTH = ("screw-cyclic", "screw-lead", "joint-runout", "backlash", "reversal-spike", "servo-lag", "gravity")
+OVER_LENGTH = ("screw-cyclic", "screw-lead", "backlash", "servo-lag", "gravity")
 """What a wave along the screw could be taken for."""
 FEW = ("backlash", "gravity", "servo-lag", "reversal-spike")
 """Of what is interrupted: the rounds of a comparison are the same for few causes and for all."""

@@ -104,7 +104,7 @@ def test_noise_and_mountings_alone_are_no_difference(reference, draws, samples):
 
 
 def test_a_strut_that_became_longer_is_told(reference):
-    shop = Workshop(1, tests=ALL, samples=720)
+    shop = Workshop(1, tests=ALL, samples=540)
     a = shop.session("A")
     b = shop.session("B", lambda circle, theta, _: strut_gain(reference, circle, theta)[:, 2] * 0.0015)
     found = compare(reference, a, b)

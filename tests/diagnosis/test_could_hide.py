@@ -16,7 +16,7 @@ KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 
 
 def diagnosed(folder, names, *mechanisms):
-    record(folder, seed=72, mechanisms=[KINEMATICS, *mechanisms], rate_hz=5.0)
+    record(folder, seed=72, mechanisms=[KINEMATICS, *mechanisms], rate_hz=2.0)
     recorded = load_sessions([folder])
     return diagnose(recorded.machine, recorded.observations, sources_named(names))
 

@@ -62,9 +62,9 @@ def wobble_um(mechanism, length_mm):
     return mechanism.amplitude_um * np.sin(2 * np.pi * turns + np.radians(mechanism.phase_deg))
 
 
-def diagnosed(folder, seed, mechanism, tests=EIGHT):
+def diagnosed(folder, seed, mechanism, tests=EIGHT, rate_hz=MEANS_OF_TWO_HZ):
     plan = subset(table_ii_plan(seed), tests)
-    truth = record(folder, seed=seed, plan=plan, mechanisms=[KINEMATICS, mechanism], rate_hz=MEANS_OF_TWO_HZ)
+    truth = record(folder, seed=seed, plan=plan, mechanisms=[KINEMATICS, mechanism], rate_hz=rate_hz)
     recorded = load_sessions([folder])
     sources = sources_named(["backlash", "bar-drift"])
     return truth, diagnose(recorded.machine, recorded.observations, sources)
@@ -77,12 +77,12 @@ def wave(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def hollow(tmp_path_factory):
-    return diagnosed(tmp_path_factory.mktemp("unexplained") / "hollow", 27, HOLLOW, ALL)
+    return diagnosed(tmp_path_factory.mktemp("unexplained") / "hollow", 27, HOLLOW, ALL, rate_hz=3.0)
 
 
 @pytest.fixture(scope="module")
 def soft(tmp_path_factory):
-    return diagnosed(tmp_path_factory.mktemp("unexplained") / "soft", 28, SoftSpot())
+    return diagnosed(tmp_path_factory.mktemp("unexplained") / "soft", 28, SoftSpot(), rate_hz=3.0)
 
 
 def arrays(curve):

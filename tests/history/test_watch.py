@@ -27,10 +27,12 @@ def tables_with_an_alarm(rng, *, tables, quantities, sessions, rate, scatter):
     return found, chart
 
 
-@pytest.mark.parametrize("scatter", [1.0, 3.0])
-def test_a_table_gives_as_many_false_alarms_as_stated(rng, scatter):
-    """500 tables; the stated share by the Markov chain, its 99.9 % binomial interval."""
-    tables, quantities, sessions, rate = 500, 6, 110, 0.01
+@pytest.mark.parametrize(
+    ("scatter", "tables"), [(1.0, 500), (3.0, 150), pytest.param(3.0, 500, marks=pytest.mark.nightly)]
+)  # where the scatter contradicts what is stated, a table takes seven times as long
+def test_a_table_gives_as_many_false_alarms_as_stated(rng, scatter, tables):
+    """So many tables; the stated share by the Markov chain, its 99.9 % binomial interval."""
+    quantities, sessions, rate = 6, 110, 0.01
     found, chart = tables_with_an_alarm(
         rng, tables=tables, quantities=quantities, sessions=sessions, rate=rate, scatter=scatter
     )

@@ -53,6 +53,7 @@ def test_it_goes_on_where_a_run_ends_and_stands_between_runs():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_parts")
 @pytest.mark.parametrize("seed", [20_101, pytest.param(20_104, marks=pytest.mark.nightly)])
 def test_a_random_walk_follows_no_variable_but_time(seed):
     levels = find_mismatch(null_table("walk", seed)).levels

@@ -80,7 +80,7 @@ def test_one_height_loses_three() -> None:
     assert visible_directions(kinematic_matrix(level)) == 21
 
 
-@pytest.mark.parametrize("names", ["abcde", "klmno"])
+@pytest.mark.parametrize("names", ["abcde", pytest.param("klmno", marks=pytest.mark.nightly)])
 def test_raising_the_bar_in_five_tests_shows_everything(names: str) -> None:
     raised = kinematic_matrix(elevated(PLAN, 5.0, names))
     assert visible_directions(raised) == 24

@@ -14,7 +14,7 @@ from studies.coverage import coverage, wilson
 @pytest.mark.parametrize(
     ("name", "level", "machines"),
     [
-        ("table2-elevated", False, 16),
+        ("table2-elevated", False, 10),
         pytest.param("table2-elevated", False, 40, marks=pytest.mark.nightly),
         pytest.param("table2", True, 40, marks=pytest.mark.nightly),
     ],

@@ -9,7 +9,7 @@ from scipy import stats
 from studies.coverage_calibration import CASES, coverage_of_calibration, drawn_figures
 from studies.coverage_rows import LEAST, WITHIN, row_of
 
-DRAWS, MORE = 4, 8
+DRAWS, MORE = 3, 8
 """Too few to show what the whole study does: that u lacks a part of correlated noise (docs/validation.md)."""
 
 

@@ -16,7 +16,7 @@ ROWS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("draws", [3, pytest.param(6, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("draws", [2, pytest.param(6, marks=pytest.mark.nightly)])
 def test_intervals_of_circles_hold_the_truth(tmp_path, draws):
     """No row is below 93 % by more than chance, by all noises and kinds of circles, by one noise, or by one kind."""
     told = []

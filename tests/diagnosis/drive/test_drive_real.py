@@ -12,6 +12,8 @@ from click.testing import CliRunner
 
 from dbbstation.cli.identify import identify as drive
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 
 @pytest.fixture(scope="module")
 def summary(recordings, tmp_path_factory):

@@ -4,6 +4,8 @@ import pytest
 
 from tests.diagnosis.simulator.systems import SYSTEMS, asked, verdict_of
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 
 def expect_right(name, seed=1):
     system = SYSTEMS[name]

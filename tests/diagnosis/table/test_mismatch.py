@@ -29,6 +29,8 @@ from tests.inference.reading import read_by_levels
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 ASKED = TableOptions("measured_mm", "simulated_mm")
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from dbbstation.computing.arrays import hypot_of, sum_of
 from dbbstation.inference.harmonics import bands, coefficients, noise_spectrum
-from dbbstation.trace.cut import SMALLEST_SHAPE_MM
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
@@ -22,7 +21,10 @@ FEWEST_SAMPLES = 100
 ROUNDING = sqrt(12.0)
 """Step of rounded readings over the standard deviation of rounding [GUM 4.3.7]."""
 
-LEAST_UM = 1e3 * SMALLEST_SHAPE_MM / ROUNDING
+FINEST_STEP_UM = 0.1
+"""Step of readings that no bar resolves more finely [µm]."""
+
+LEAST_UM = FINEST_STEP_UM / ROUNDING
 """Least noise, below any real bar [µm]. Computed recordings have less, and any difference would be significant."""
 
 

@@ -48,8 +48,9 @@ TELLING = 1e-3
 """Largest relative standard deviation of a feed that an overlap determines. A compensated circle has hardly any shape,
 so it would match any feed."""
 
-SMALLEST_SHAPE_MM = 1e-4
-"""Overlaps with less shape are unusable: bars do not resolve it [mm]."""
+LEAST_SHAPE = 8.2
+"""Least variance of the overlap's bent shape over that of its noise. Noise alone exceeds it once in 10,000 times (F distribution
+with 6 and 22 degrees of freedom). Less shape matches at any shift: of a machine that stands at a corner, or of a short arc."""
 
 PIECES = 24
 """Number of pieces of the overlap whose means are compared."""
@@ -288,36 +289,38 @@ def _match(
     if len(when) < PIECES:
         return None
     piece = np.arange(len(when)) * PIECES // len(when)
-    if np.std(means(first, piece)) < SMALLEST_SHAPE_MM:
-        return None
     slope_of = _slopes(when, piece)
     turn = start_s
     for _ in range(ROUNDS):
         second = np.interp(when + turn, t, length)
-        slope = slope_of((first + second) / 2.0)
+        slope, shape = slope_of((first + second) / 2.0)
         columns = np.column_stack([np.ones(PIECES), slope])
         difference = means(second - first, piece)
         (offset, late), *_ = np.linalg.lstsq(columns, difference, rcond=None)
         turn -= float(late)
-        if abs(turn - start_s) > FEED_SEARCH * half_s:
+        # Shifted by so much, the second pass ends before the feed-out.
+        if abs(turn - start_s) > FEED_SEARCH * half_s - circle.feeding_s:
             return None
     left = difference - columns @ np.array([offset, late])
     spread = float(np.sum((slope - slope.mean()) ** 2))
     remaining = float(np.sqrt(left @ left / (PIECES - 2)))
-    if not spread > 0.0:
-        return turn, np.inf, remaining, np.inf
+    # A straight shape is an offset at any shift. A mean of two samples has a quarter of the variance of their difference.
+    noise = remaining**2 / 4.0 * len(when) / PIECES
+    if not np.mean(shape[2:] ** 2) > LEAST_SHAPE * noise:
+        return None
     # Each piece is the mean of len(when) / PIECES differences of two samples.
     of_noise = float(np.sqrt(2.0 * PIECES / len(when) / spread))
     return turn, remaining / float(np.sqrt(spread)), remaining, of_noise
 
 
-def _slopes(t_s: Floats, piece: Integers) -> Callable[[Floats], Floats]:
+def _slopes(t_s: Floats, piece: Integers) -> Callable[[Floats], tuple[Floats, Floats]]:
+    """Return a function from samples to the slopes of their pieces, and to the coefficients of orthogonal polynomials."""
     middle, half_s = 0.5 * (t_s[0] + t_s[-1]), 0.5 * (t_s[-1] - t_s[0])
     powers = np.polynomial.polynomial.polyvander((t_s - middle) / half_s, SHAPE_ORDER)
     orthogonal, upper = np.linalg.qr(powers)
     rates = powers[:, :-1] * (np.arange(1.0, SHAPE_ORDER + 1.0) / half_s)
     of_rest = np.linalg.solve(upper.T, np.column_stack([np.zeros(PIECES), means(rates, piece)]).T).T
-    return lambda values: of_rest @ (orthogonal.T @ values)
+    return lambda values: (of_rest @ (shape := orthogonal.T @ values), shape)
 
 
 def one_turn_deg(theta_deg: Floats, circle: Circle) -> Floats:

@@ -11,6 +11,7 @@ from dbbstation.errors import TraceError
 from dbbstation.plan.plan import Circle, Direction
 from dbbstation.trace.analysis import figures
 from dbbstation.trace.cut import (
+    FEED_TOLERANCE,
     PIECES,
     SHAPE_ORDER,
     _slopes,
@@ -31,17 +32,17 @@ def shape(theta_deg):
     return 0.05 * np.cos(theta) - 0.03 * np.sin(2 * theta) + 0.004 * np.cos(5 * theta)
 
 
-def trace(circle=CIRCLE, dwell_s=0.3, feed=None, noise_mm=0.0, seed=0):
+def trace(circle=CIRCLE, dwell_s=0.3, feed=None, noise_mm=0.0, seed=0, rate_hz=RATE_HZ, size=1.0):
     feed = feed or circle.feed_mm_min
     turning = np.degrees(feed / 60 / circle.radius_mm)
     feeding_s, arc_s = circle.feed_in_mm / (feed / 60), circle.swept_deg / turning
-    t = np.arange(0, 2 + 2 * feeding_s + 2 * dwell_s + arc_s, 1 / RATE_HZ)
+    t = np.arange(0, 2 + 2 * feeding_s + 2 * dwell_s + arc_s, 1 / rate_hz)
     start = 1 + feeding_s + dwell_s
     phi = np.clip((t - start) * turning, 0, circle.swept_deg) - circle.overshoot_deg
     outside = np.interp(t, [1, 1 + feeding_s], [1, 0]) + np.interp(
         t, [start + arc_s + dwell_s, start + arc_s + dwell_s + feeding_s], [0, 1]
     )
-    length = circle.bar_mm + circle.feed_in_mm * outside + shape(circle.theta_deg(phi))
+    length = circle.bar_mm + circle.feed_in_mm * outside + size * shape(circle.theta_deg(phi))
     noise = np.random.default_rng(seed).normal(0, noise_mm, len(t))
     return Recording("a run", t, length + noise)
 
@@ -114,6 +115,17 @@ def test_another_feed_is_found_and_named(feed):
 def test_the_feed_of_good_runs_is_never_doubted():
     for seed in range(60):
         cut(trace(noise_mm=0.0005, seed=seed), CIRCLE)
+
+
+@pytest.mark.parametrize("size", [1.0, 0.2])
+def test_a_standstill_at_a_corner_is_no_overlap_of_another_feed(size):
+    """A dwell of 0.3 s is longer than the arc of 5° that both passes share at this feed."""
+    circle = replace(CIRCLE, feed_mm_min=6000, overshoot_deg=5)
+    for seed in range(40):
+        recording = trace(circle, noise_mm=0.0003, seed=seed, rate_hz=250.0, size=size)
+        found = overlap_feed(recording, circle, edges_of(recording, circle))
+        assert found is None or found[0] == pytest.approx(6000, rel=FEED_TOLERANCE)
+        cut(recording, circle)
 
 
 def test_a_perfect_circle_cannot_tell_its_feed_and_is_not_refused():
@@ -234,7 +246,7 @@ def test_slopes_of_an_overlap_are_those_of_the_fitted_polynomial():
     slope_of = _slopes(t, piece)
     for values in (0.05 * np.cos(0.4 * t), 150.0 + 0.01 * (t - 23.0) ** 3 + 1e-4 * np.sin(50.0 * t)):
         direct = np.polynomial.Polynomial.fit(t, values, SHAPE_ORDER).deriv()(t)
-        assert slope_of(values) == pytest.approx(means(direct, piece), abs=1e-9)
+        assert slope_of(values)[0] == pytest.approx(means(direct, piece), abs=1e-9)
 
 
 def test_a_turn_is_cut_out_once_and_another_circle_anew():

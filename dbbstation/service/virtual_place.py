@@ -15,7 +15,7 @@ from dbbstation.virtual.cell import VirtualCell
 from dbbstation.virtual.machine import VirtualMachine, path_of
 from dbbstation.virtual.truth import random_kinematics
 from dbbstation.virtual.wire import VirtualInstrument
-from dbbstation.virtual.wire_clock import ScaledClock
+from dbbstation.virtual.wire_clock import PacedClock
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -84,7 +84,7 @@ def virtual_place(job: Job, protocol: Protocol, time_scale: float, seed: int = S
     )
     # Also compiles what is computed, so that the first circle does not wait for that.
     virtual.check()
-    clock = ScaledClock(time_scale)
+    clock = PacedClock(time_scale)
     cell = VirtualCell(virtual, clock)
     with VirtualInstrument(protocol, cell.length_mm_at, clock=clock) as wire:
         timed = replace(job, clock=clock, time_scale=time_scale)

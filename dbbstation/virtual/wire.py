@@ -243,11 +243,11 @@ class VirtualInstrument:
                     if self.protocol.ask.mode == "stream":
                         self._sample(now_s, connected=end.connected)
                         self._transmit(end, now_s)
-                        if len(self._outgoing) < _UNDER_WAY:
-                            self.clock.advance()
                     else:
                         self._transmit(end, self.clock.line_s())
                         self._incoming = self._incoming if end.connected else b""
+                    if len(self._outgoing) < _UNDER_WAY:
+                        self.clock.advance(asked=self.protocol.ask.asked)
         except Exception as error:  # noqa: BLE001 (raised again by `stop`, in the thread that can be told)
             self._failure = error
 

@@ -19,6 +19,10 @@ miss."""
 _BEHIND_S = 3.0
 """Machine time after a run [s], so that samples follow the run's end."""
 
+_LONGEST_PACE_S = 0.01
+"""Longest step of paced time [s of real time]: twice the instrument's usual pause, so that only a busy computer is waited
+for."""
+
 _STEP_S = 0.5
 """Machine time that passes in one step [s]: some samples, so that the line carries several frames together."""
 
@@ -54,8 +58,9 @@ class ScaledClock:
         """Return the bar's waiting time before a run [s]."""
         return STAND_S * self.scale
 
-    def advance(self) -> None:
+    def advance(self, *, asked: bool) -> None:
         """Do nothing: this clock runs by itself."""
+        del asked
 
     def exchanges(self, period_s: float) -> bool:
         """Return True: this clock runs by itself."""
@@ -71,6 +76,24 @@ class ScaledClock:
 
     def settle(self) -> None:
         """Do nothing: this clock never stops."""
+
+
+class PacedClock(ScaledClock):
+    """Machine time that stands still while its computer is busy elsewhere; the instrument advances it."""
+
+    def __init__(self, scale: float = 1.0) -> None:
+        super().__init__(scale)
+        self._now_s, self._seen_s = 0.0, time.monotonic()
+
+    def __call__(self) -> float:
+        """Return the machine time [s]."""
+        return self._now_s
+
+    def advance(self, *, asked: bool) -> None:
+        """Advance by the real time since the last call, if that is short."""
+        del asked
+        seen_s, self._seen_s = self._seen_s, time.monotonic()
+        self._now_s += self.scale * min(self._seen_s - seen_s, _LONGEST_PACE_S)
 
 
 class WaitingClock(ScaledClock):
@@ -93,8 +116,10 @@ class WaitingClock(ScaledClock):
         """Return the bar's waiting time before a run [s]."""
         return _STAND_WAITING_S
 
-    def advance(self) -> None:
-        """Advance a little, up to the run's end."""
+    def advance(self, *, asked: bool) -> None:
+        """Advance a little, up to the run's end, unless requests do."""
+        if asked:
+            return
         with self._stands:
             self._now_s = min(self._now_s + _STEP_S, self._until_s)
             if self._now_s >= self._until_s:

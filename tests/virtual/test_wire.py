@@ -14,7 +14,7 @@ from dbbstation.instrument.codec import decode
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import load_instrument
 from dbbstation.virtual.wire import VirtualInstrument
-from dbbstation.virtual.wire_clock import ScaledClock
+from dbbstation.virtual.wire_clock import PacedClock, ScaledClock
 from tests.instrument.leaks import nothing_left_open
 from tests.virtual.clocks import HandClock, LeapingClock
 
@@ -103,6 +103,27 @@ def test_the_stream_loses_nothing(pty: bool) -> None:  # noqa: FBT001 (a paramet
         [n / 250.0 for n in range(2500)], abs=2e-5
     )
     assert [(one.counter - readings[0].counter) % 100_000 for one in readings] == list(range(2500))
+
+
+@pytest.mark.parametrize(("paced", "falls_behind"), [(PacedClock, False), (ScaledClock, True)])
+def test_a_machine_slower_than_its_pace_is_late_and_not_wrong(*, paced: type[ScaledClock], falls_behind: bool) -> None:
+    """Each length takes 2 ms to compute, but 250 a second at ten times real time leave 0.4 ms."""
+
+    def length_mm_at(t_s: float) -> float:
+        time.sleep(0.002)
+        return 100.0 + t_s
+
+    clock = paced(10.0)
+    with (
+        VirtualInstrument(ENCODER, length_mm_at, clock=clock) as virtual,
+        Instrument(ENCODER, virtual.port, clock=clock, timeout_s=60.0) as driver,
+    ):
+        readings = list(driver.readings(600))
+        behind_s = clock() - (readings[-1].length_mm - 100.0)
+    assert driver.tally.lost == 0
+    taken_s = [one.length_mm - readings[0].length_mm for one in readings]
+    assert taken_s == pytest.approx([n / 250.0 for n in range(600)], abs=2e-5)
+    assert (behind_s > 2.0) is falls_behind
 
 
 @LINES

@@ -17,7 +17,7 @@ from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.instrument.library import load_instrument
+from dbbstation.instrument.library import at_rate, load_instrument
 from dbbstation.plan.plan import Direction
 from dbbstation.service.after import After
 from dbbstation.service.choice import SetUpPart
@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from textual.pilot import Pilot
+
+    from dbbstation.instrument.protocol import Protocol
 
     Play = Callable[[Pilot[None], StationApp], Awaitable[None]]
 
@@ -144,8 +146,15 @@ async def measured(pilot: Pilot[None], app: StationApp, runs: int) -> None:
         await until(pilot, lambda: app.board.state not in {State.COMPLETE, State.FLAWED})
 
 
+def slower(name: str, profile: str | None = None) -> Protocol:
+    """The usual instrument at a rate that leaves the computer time: ten times real speed makes it ten times as much work."""
+    protocol = load_instrument(name, profile)
+    return at_rate(protocol, 50.0) if name == "streaming-encoder" else protocol
+
+
 @pytest.fixture
-def front(tmp_path: Path) -> Front:
+def front(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Front:
+    monkeypatch.setattr("dbbstation.service.memory.load_instrument", slower)
     shop = tmp_path / "shop"
     shop.mkdir()
     one_circle(shop, feed_mm_min=6000)

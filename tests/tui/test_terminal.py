@@ -37,7 +37,7 @@ class Terminal:
         self.modes = termios.tcgetattr(slave)
         environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"} | more
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "dbbstation", "measure", *arguments],
+            [sys.executable, "-m", "dbbstation", "measure", "--rate-hz", "50", *arguments],
             stdin=slave,
             stdout=slave,
             stderr=slave,

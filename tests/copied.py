@@ -24,6 +24,9 @@ LOADED = (
     "dbbstation.cli.measure",
     "dbbstation.cli.measure_talk",
     "dbbstation.cli.instruments",
+    "dbbstation.cli.on_screen",
+    "dbbstation.tui.app",
+    "dbbstation.service.runner",
 )
 
 _CAN = hasattr(os, "fork") and "DBBSTATION_AS_ON_WINDOWS" not in os.environ
@@ -35,7 +38,9 @@ class Copy(subprocess.Popen):
     def _execute_child(self, args, executable, preexec_fn, close_fds, pass_fds, cwd, env, *more):  # noqa: ARG002
         inputs = more[3:9]  # behind startupinfo, creationflags and shell: each pipe's end of the child, and ours
         ends = [own if own >= 0 else number for number, own in enumerate((inputs[0], inputs[3], inputs[5]))]
-        self.pid = _original().begin(list(map(str, args)), str(cwd or Path.cwd()), dict(env or os.environ), ends)
+        self.pid = _original().begin(
+            list(map(str, args)), str(cwd or Path.cwd()), dict(env or os.environ), ends, alone=more[14]
+        )
         self._child_created = True
         self._close_pipe_fds(*inputs)
 
@@ -53,7 +58,7 @@ class Copy(subprocess.Popen):
 
 
 def started(words, **named) -> subprocess.Popen:
-    """Start `python -m dbbstation WORDS`; further arguments are those of `subprocess.Popen`."""
+    """Start `python -m dbbstation WORDS` with streams in UTF-8; further arguments are those of `subprocess.Popen`."""
     return (
         Copy(words, **named)
         if _CAN
@@ -89,8 +94,8 @@ class _Original:
         self._told.close()
         self._process.wait()
 
-    def begin(self, words, folder, environment, ends) -> int:
-        asked = pickle.dumps((words, folder, environment))
+    def begin(self, words, folder, environment, ends, *, alone) -> int:
+        asked = pickle.dumps((words, folder, environment, alone))
         socket.send_fds(self._line, [len(asked).to_bytes(4, "big")], ends)
         self._line.sendall(asked)
         while (begun := self._next()) is None:
@@ -180,7 +185,7 @@ def _asked(line: socket.socket):
     return (ends, *pickle.loads(asked)) if size else None  # noqa: S301 - written above
 
 
-def _become(ends, words, folder, environment) -> None:
+def _become(ends, words, folder, environment, alone) -> None:
     code = 1
     try:
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -190,11 +195,19 @@ def _become(ends, words, folder, environment) -> None:
         for number, end in enumerate(ends):
             os.dup2(end, number)
             os.close(end)
+        if alone:
+            os.setsid()
+        # As Python opens them: by lines to a terminal.
+        sys.stdin = sys.__stdin__ = open(0, closefd=False)  # noqa: SIM115
+        sys.stdout = sys.__stdout__ = open(1, "w", closefd=False)  # noqa: SIM115
+        sys.stderr = sys.__stderr__ = open(2, "w", buffering=1, errors="backslashreplace", closefd=False)  # noqa: SIM115
         sys.argv[1:] = words
         runpy.run_module("dbbstation", run_name="__main__", alter_sys=True)
         code = 0
     except SystemExit as ended:
         code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+    except BaseException:  # noqa: BLE001 - printed as Python does at the end of a program
+        sys.excepthook(*sys.exc_info())
     finally:
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError, ValueError):

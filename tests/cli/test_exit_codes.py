@@ -12,9 +12,12 @@ import pytest
 
 from dbbstation.cli import DONE, FAILED, USAGE
 from dbbstation.files.places import shipped_folder
+from tests import copied
 
 PROGRAM = [sys.executable, "-m", "dbbstation"]
 PATIENCE_S = 60
+
+pytestmark = pytest.mark.usefixtures("copies")
 
 
 @pytest.mark.parametrize(
@@ -91,9 +94,7 @@ def test_a_folder_that_cannot_be_written(run, tmp_path, model):
 
 
 def started(*arguments, **options):
-    return subprocess.run(
-        [*PROGRAM, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=PATIENCE_S, **options
-    )
+    return copied.done(arguments, timeout=PATIENCE_S, **options)
 
 
 @pytest.mark.parametrize("arguments", [["--debug", "calibrate", "nowhere"], ["calibrate", "nowhere", "--debug"]])
@@ -149,8 +150,8 @@ def test_an_interrupt_leaves_no_half_result(run, monkeypatch, tmp_path, fifteen)
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_ctrl_c_a_polite_kill_and_a_closed_terminal(tmp_path, fifteen, name):
-    command = [*PROGRAM, "calibrate", str(fifteen), "--out", str(tmp_path / "model.yaml"), "--verbose"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    words = ["calibrate", fifteen, "--out", tmp_path / "model.yaml", "--verbose"]
+    with copied.started(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         while "session.yaml" not in (line := process.stderr.readline()):
             assert line, "the program ended before it read the session"

@@ -32,8 +32,8 @@ def test_a_diagnosis_drawn(run, elsewhere, tmp_path):
     assert outcome.data == run(*arguments).data
 
 
-def test_a_calibration_drawn(run, fifteen, tmp_path):
-    arguments = ("calibrate", fifteen, "--json")
+def test_a_calibration_drawn(run, elsewhere, tmp_path):
+    arguments = ("calibrate", elsewhere, "--json")
     drawn, outcome = drawn_twice(run, tmp_path / "calibration.svg", *arguments)
     assert b"leverage of each test" in drawn
     assert outcome.data == run(*arguments).data
@@ -53,7 +53,7 @@ BEGINS = {".png": b"\x89PNG\r\n\x1a\n", ".pdf": b"%PDF-1."}
 @pytest.mark.parametrize(
     ("command", "ending"),
     [
-        (("calibrate",), ".png"),
+        pytest.param(("calibrate",), ".png", marks=pytest.mark.nightly),
         (("calibrate",), ".pdf"),
         pytest.param(("calibrate",), ".PNG", marks=pytest.mark.nightly),
         (("diagnose", "--sources", "backlash"), ".png"),

@@ -6,7 +6,6 @@ import hashlib
 import os
 import re
 import shutil
-import subprocess
 import sys
 
 import pytest
@@ -14,6 +13,7 @@ import pytest
 from dbbstation import __version__
 from dbbstation.cli import DONE, FAILED, USAGE, log
 from dbbstation.files.places import shipped_folder
+from tests import copied
 
 SMALL = shipped_folder("fixtures") / "sessions" / "small"
 MODEL = shipped_folder("fixtures") / "models" / "small.yaml"
@@ -165,11 +165,9 @@ def test_nothing_stays_open_behind_a_command(run, shop):
     assert (list(log.LOG.handlers), log.LOG.level) == before
 
 
+@pytest.mark.usefixtures("copies")
 def test_the_stages_of_long_work_stand_there(shop):
-    words = ["diagnose", str(shop / "small"), "--sources", "gravity"]
-    done = subprocess.run(
-        [sys.executable, "-m", "dbbstation", *words], capture_output=True, text=True, check=False, env=dict(os.environ)
-    )
+    done = copied.done(["diagnose", shop / "small", "--sources", "gravity"])
     assert done.returncode == DONE, done.stderr
     told = [LINE.match(line)[3] for line in lines_of(of_user(shop))]
     assert "... kinematic calibration" in told

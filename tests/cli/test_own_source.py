@@ -41,7 +41,7 @@ class BowedScales(Mechanism):
 @pytest.fixture(scope="module", params=[EIGHT, pytest.param("abcdefghijklmno", marks=pytest.mark.nightly)])
 def bowed(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bowed") / "session"
-    record(folder, seed=41, plan=subset(table_ii_plan(41), request.param), mechanisms=[BowedScales()], rate_hz=10.0)
+    record(folder, seed=41, plan=subset(table_ii_plan(41), request.param), mechanisms=[BowedScales()], rate_hz=4.0)
     return folder
 
 

@@ -28,6 +28,7 @@ from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources
 from dbbstation.tasks.diagnose import STAGES
 from tests.cli.screen import COLUMNS, ROWS, bars, watched
+from tests.copied import started
 
 pty = pytest.importorskip("pty", reason="needs a pseudo-terminal")
 
@@ -291,9 +292,8 @@ def test_ctrl_c_ends_with_one_line_and_leaves_whole_files(tmp_path, name, after_
 def in_terminal() -> tuple[int, str]:
     """Run the command with standard error on a terminal, and interrupt it as soon as the bar is there."""
     ours, theirs = pty.openpty()
-    process = subprocess.Popen(
-        PROGRAM, stdout=subprocess.DEVNULL, stderr=theirs, env={**os.environ, "COLUMNS": str(COLUMNS), "TERM": "xterm"}
-    )
+    environment = {**os.environ, "COLUMNS": str(COLUMNS), "TERM": "xterm"}
+    process = started(PROGRAM[3:], stdout=subprocess.DEVNULL, stderr=theirs, env=environment)
     os.close(theirs)
     said, end_s = b"", time.monotonic() + PATIENCE_S
     interrupt = True
@@ -310,6 +310,7 @@ def in_terminal() -> tuple[int, str]:
     return process.wait(PATIENCE_S), said.decode()
 
 
+@pytest.mark.usefixtures("copies")
 def test_ctrl_c_ends_the_bar_and_says_so():
     code, said = in_terminal()
     assert code == FAILED

@@ -66,7 +66,7 @@ def lines(tmp_path_factory):
         PENDULUM / "pendulum.yaml",
         "--no-held-out",
     ]
-    found["fleet"] = ["fleet", folder / "many", "--out", folder / "fleet", "--task", "circles"]
+    found["fleet"] = ["fleet", folder / "many", "--out", folder / "fleet", "--task", "circles", "--jobs", "1"]
     found["check"] = found["check"][:-2]  # a plan and a machine: the dry run
     return {name: [*line, *RATHER.get(name, [])] for name, line in found.items()}
 

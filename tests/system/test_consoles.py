@@ -20,8 +20,14 @@ def in_unicode(*command):
     return subprocess.run(command, env=environment, capture_output=True, check=False).stdout.decode("utf-8")
 
 
-@pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])
-@pytest.mark.parametrize("words", [("circles",), ("session", "list")])
+@pytest.mark.parametrize(
+    ("words", "encoding"),
+    [
+        *((("session", "list"), encoding) for encoding in ("cp1252", "cp437", "ascii")),
+        (("circles",), "cp1252"),
+        *(pytest.param(("circles",), encoding, marks=pytest.mark.nightly) for encoding in ("cp437", "ascii")),
+    ],
+)
 def test_every_console_gets_the_table(encoding, words):
     """Python writes to a Windows console in Unicode, to a pipe or file in the code page of the system."""
     environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}

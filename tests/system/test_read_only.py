@@ -77,7 +77,7 @@ def run(folder, line):
         "check small logged",
         "session list small",
         "export small --out mine/e.csv",
-        "history . --json",
+        pytest.param("history . --json", marks=pytest.mark.nightly),  # the next line reads as much
         "history . --table mine/h.csv",
     ],
 )

@@ -186,7 +186,7 @@ def test_a_worker_that_is_killed_in_mid_run_loses_nothing_and_counts_nothing_twi
 
 
 def test_a_fleet_on_a_scheduler_has_the_numbers_of_one_process_bit_by_bit(cluster, tmp_path):
-    sessions = machines(tmp_path / "sessions", 3)
+    sessions = machines(tmp_path / "sessions", 2)
     for name, words in (("one", ["--jobs", "1"]), ("two", ["--jobs", "2"]), ("dask", ["--scheduler", cluster.address])):
         done = call("fleet", sessions, "--task", "calibrate", "--out", tmp_path / name, *words)
         assert done.code == 0, done.err

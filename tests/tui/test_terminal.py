@@ -11,6 +11,7 @@ import subprocess
 import sys
 import termios
 import time
+from functools import partial
 from typing import TYPE_CHECKING
 
 import pytest
@@ -18,10 +19,13 @@ import pytest
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
+from tests.copied import started
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+pytestmark = pytest.mark.usefixtures("copies")
 
 PATIENCE_S = 60.0
 MAIN_SCREEN_AGAIN = "\x1b[?1049l"
@@ -36,8 +40,12 @@ class Terminal:
         fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
         self.modes = termios.tcgetattr(slave)
         environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"} | more
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "dbbstation", "measure", "--rate-hz", "50", *arguments],
+        words = ["measure", "--rate-hz", "50", *arguments]
+        # Python looks at variables for its streams when it starts.
+        start = (
+            partial(subprocess.Popen, [sys.executable, "-m", "dbbstation", *words]) if more else partial(started, words)
+        )
+        self.process = start(
             stdin=slave,
             stdout=slave,
             stderr=slave,

@@ -137,13 +137,9 @@ async def measured(pilot: Pilot[None], app: StationApp, runs: int) -> None:
     while app.board.accepted < runs:
         await until(pilot, lambda: app.board.state is State.ANNOUNCED)
         await press(app, "enter")
-        await until(pilot, lambda: app.board.state in {State.COMPLETE, State.FLAWED})
-        # Sped up so much, a computer that is busy for a moment leaves a hole in a circle; then once more.
-        if app.board.state is State.COMPLETE:
-            await accept(pilot, app)
-        else:
-            await press(app, "r")
-        await until(pilot, lambda: app.board.state not in {State.COMPLETE, State.FLAWED})
+        await until(pilot, lambda: app.board.state is State.COMPLETE)
+        await accept(pilot, app)
+        await until(pilot, lambda: app.board.state is not State.COMPLETE)
 
 
 def slower(name: str, profile: str | None = None) -> Protocol:

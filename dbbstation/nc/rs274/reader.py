@@ -78,6 +78,9 @@ def _unreadable(flow: Flow) -> list[Problem]:
 
 
 class _Interpreter(Moves):
+    _alone_until = 0
+    """Lines before this one run alone: they were read together, and none of them could begin a common run."""
+
     def run_all(self) -> None:
         """Run all blocks to the program's end.
 
@@ -157,6 +160,7 @@ class _Interpreter(Moves):
             or self._cutter
             or self._unsure_feed
             or self._since_cycle
+            or first < self._alone_until
         ):
             return False
         lines, unit_mm = self.flow.plain_lines(), self._state.unit_mm
@@ -170,6 +174,7 @@ class _Interpreter(Moves):
         bad[max(MOST_ROWS - len(self.path), 0) :] = True
         end = int(np.argmax(bad)) if bad.any() else len(bad)
         if end == 0:
+            self._alone_until = first + (len(bad) if bad.all() else int(np.argmin(bad)))
             return False
         # An F from before counts in the units that were in force there.
         old = np.logical_and.accumulate(np.isnan(lines.feed))

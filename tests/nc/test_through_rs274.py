@@ -1,6 +1,6 @@
 """Generated programs before and after compensation, both through LinuxCNC's interpreter.
 
-A hundred hold every word of the grammar. `DBBSTATION_FUZZ=5000` runs as many programs as that; `DBBSTATION_FUZZ_FROM` is the first seed. `-m nightly` runs 50,000, in
+Fifty hold every word of the grammar. `DBBSTATION_FUZZ=5000` runs as many programs as that; `DBBSTATION_FUZZ_FROM` is the first seed. `-m nightly` runs 50,000, in
 blocks; `DBBSTATION_FUZZ_PASSED` names a file in which those that passed are noted, and a run that was interrupted goes on there.
 """
 
@@ -25,7 +25,7 @@ from tests.nc.through_rs274 import MOVES, DiffersError, compare
 
 pytestmark = needs_rs274
 
-COUNT = int(os.environ.get("DBBSTATION_FUZZ", "100"))
+COUNT = int(os.environ.get("DBBSTATION_FUZZ", "50"))
 FIRST = int(os.environ.get("DBBSTATION_FUZZ_FROM", "0"))
 SHARES = 2
 

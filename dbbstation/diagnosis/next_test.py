@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.explain import Explained
     from dbbstation.diagnosis.findings import SourceFinding
     from dbbstation.inference.model_comparison import Variant
+    from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
@@ -73,12 +74,14 @@ class Proposal:
 
 
 class ForeseenTests:
-    """Possible tests of a channel."""
+    """Possible tests of a channel; what a run would show is computed once."""
 
     def __init__(self, channel: CircleChannel) -> None:
         self.channel = channel
         self._ends_s = _ends_s(channel)
         self._samples = float(np.mean([len(o.raw) for o in channel.observations]))
+        self._readings: dict[tuple[Circle, float, str], BarReading] = {}
+        self._columns: dict[tuple[object, ...], Floats] = {}
         self._is_reachable = cache(lambda circle: is_within_travel(channel.machine, circle.envelope(step_deg=15.0)))
 
     def that_show(self, needs: Collection[Need]) -> list[Proposal]:
@@ -120,10 +123,16 @@ class ForeseenTests:
         """
         machine, layout, found = self.channel.machine, self.channel.calibration.layout, []
         for direction in directions:
-            reading = MachineModel(machine).bar(_motion(proposal, direction, self._ends_s))
-            parts = [by_terms(reading, layout, layout.nominal)]
+            run = replace(proposal.circle, direction=direction), proposal.wait_s, proposal.observation.setup.ball
+            if run not in self._readings:
+                self._readings[run] = MachineModel(machine).bar(_motion(proposal, direction, self._ends_s))
+                self._columns[run] = by_terms(self._readings[run], layout, layout.nominal)
+            reading, parts = self._readings[run], [self._columns[run]]
             for source, variant in asked:
-                own = by_amplitudes(reading, source, machine, variant.nonlinear)
+                form = (*run, source.name, source.law, variant.nonlinear)
+                if form not in self._columns:
+                    self._columns[form] = by_amplitudes(reading, source, machine, variant.nonlinear)
+                own = self._columns[form]
                 # Values of other sessions and mountings do not affect this run.
                 parts.append(np.pad(own, ((0, 0), (0, len(variant.columns) - own.shape[1]))))
             rows = np.hstack(parts)

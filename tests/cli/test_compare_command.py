@@ -18,6 +18,7 @@ from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
 
 pytestmark = pytest.mark.usefixtures("answers_kept")
+QUICK = ("--no-held-out",)  # which takes most of the time
 RUNS = [f"{test}-{direction}-1" for test in "agl" for direction in ("ccw", "cw")]
 
 
@@ -65,7 +66,7 @@ def test_a_constant_that_was_written_into_the_files(run, three, compared):
     (offset,) = best["parameters"].values()
     assert offset["value"] == pytest.approx(0.005, abs=2 * offset["uncertainty"])
     assert found["organised_text"].startswith("bar-offset, 100 %")
-    back = run("compare", longer, three, "--json").data
+    back = run("compare", longer, three, *QUICK, "--json").data
     (offset,) = back["causes"][0]["parameters"].values()
     assert offset["value"] == pytest.approx(-0.005, abs=2 * offset["uncertainty"])
 
@@ -75,7 +76,7 @@ def test_a_centre_that_was_written_into_one_run(run, with_angles, tmp_path):
     """Bar lengths of a circle that lies 20 µm further along +Y, by the cosine law."""
     other = shutil.copytree(with_angles, tmp_path / "other")
     change(other, "g-cw-1", lambda theta, mm: np.sqrt(mm**2 + 2 * mm * 0.02 * np.sin(theta) + 0.02**2))
-    found = run("compare", with_angles, other, "--json").data
+    found = run("compare", with_angles, other, *QUICK, "--json").data
     worst, *others = found["runs"]
     assert (worst["test"], worst["direction"], worst["differs"]) == ("g", "cw", True)
     assert worst["centre_shift_um"] == pytest.approx([0.0, 20.0], abs=0.01)
@@ -110,7 +111,7 @@ def test_another_nominal_machine_is_stated_and_compared(run, three, longer, spoi
     text = (longer / "machine.yaml").read_text(encoding="utf-8")
     first = re.search(r"base_joints_mm: \[\[(-?[\d.]+)", text)[1]
     spoilt.replace("machine.yaml", first, str(float(first) + 1.0))
-    found = run("compare", three, longer, "--json").data
+    found = run("compare", three, longer, *QUICK, "--json").data
     assert found["differ"]
     assert found["notes"][0].startswith("the nominal machines differ (base joints;")
 
@@ -167,7 +168,7 @@ def test_a_run_that_only_one_of_them_has(run, three, longer):
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
     kept = [re.sub("state: accepted", "state: rejected, reason: operator", x) if "a-cw-1" in x else x for x in lines]
     path.write_text("".join(kept), encoding="utf-8")
-    found = run("compare", three, longer, "--json").data
+    found = run("compare", three, longer, *QUICK, "--json").data
     assert (found["only_in_a"], found["only_in_b"], found["runs_compared"]) == (["a cw"], [], 5)
 
 

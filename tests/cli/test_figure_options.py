@@ -11,6 +11,9 @@ from dbbstation.cli import DONE, FAILED, USAGE
 pytestmark = pytest.mark.usefixtures("answers_kept")
 
 
+QUICK = ("--sources", "backlash", "--no-held-out")
+
+
 def drawn_twice(run, target, *arguments):
     outcome = run(*arguments, "--figure", target)
     assert outcome.code == DONE, outcome.err
@@ -26,7 +29,7 @@ def drawn_twice(run, target, *arguments):
 
 
 def test_a_diagnosis_drawn(run, elsewhere, tmp_path):
-    arguments = ("diagnose", elsewhere, "--sources", "backlash", "--json")
+    arguments = ("diagnose", elsewhere, *QUICK, "--json")
     drawn, outcome = drawn_twice(run, tmp_path / "diagnosis.svg", *arguments)
     assert b"residual of each test within its mounting" in drawn
     assert outcome.data == run(*arguments).data
@@ -56,8 +59,8 @@ BEGINS = {".png": b"\x89PNG\r\n\x1a\n", ".pdf": b"%PDF-1."}
         pytest.param(("calibrate",), ".png", marks=pytest.mark.nightly),
         (("calibrate",), ".pdf"),
         pytest.param(("calibrate",), ".PNG", marks=pytest.mark.nightly),
-        (("diagnose", "--sources", "backlash"), ".png"),
-        pytest.param(("diagnose", "--sources", "backlash"), ".pdf", marks=pytest.mark.nightly),
+        (("diagnose", *QUICK), ".png"),
+        pytest.param(("diagnose", *QUICK), ".pdf", marks=pytest.mark.nightly),
     ],
 )
 def test_the_ending_says_the_format(run, elsewhere, tmp_path, command, ending):

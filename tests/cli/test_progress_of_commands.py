@@ -44,6 +44,7 @@ HAS_BAR = [
 MODEL = FIXTURES / "models" / "small.yaml"
 PENDULUM = FIXTURES / "simulators"
 RATHER = {
+    "compare": ["--no-held-out"],
     "diagnose": ["--sources", "gravity"],
     "identify": ["--no-held-out"],
     "mismatch": ["--no-held-out"],

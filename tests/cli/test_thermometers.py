@@ -75,7 +75,7 @@ def test_the_law_can_be_asked_for(run, sessions):
 
 def test_sessions_with_and_without_a_thermometer_go_together(run, few):
     both = (few / "logged", few / "bare")
-    together = run("diagnose", *both, "--sources", "thermal-frame", "--json")
+    together = run("diagnose", *both, "--sources", "thermal-frame", "--no-held-out", "--json")
     assert together.code == 0, together.err
     named = {s["name"]: s for s in together.data["sources"]}
     assert "growth_um_m_k" not in named["thermal-frame"]["parameters"]
@@ -83,7 +83,8 @@ def test_sessions_with_and_without_a_thermometer_go_together(run, few):
 
 def test_the_figure_is_drawn_over_the_thermometer(run, few, tmp_path):
     figure = tmp_path / "diagnosis.svg"
-    found = run("diagnose", few / "logged", "--sources", "thermal-frame,gravity", "--figure", figure, "--json")
+    asked = ("--sources", "thermal-frame,gravity", "--no-held-out", "--figure", figure, "--json")
+    found = run("diagnose", few / "logged", *asked)
     assert found.code == 0, found.err
     assert found.data["sources"][0]["name"] == "thermal-frame"
     assert "over temperature" in figure.read_text()

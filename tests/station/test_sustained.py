@@ -157,7 +157,7 @@ def capture(job: Job, port: str, line: int, seconds: float, monkeypatch: pytest.
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="memory and pseudo-terminals of Linux")
 @pytest.mark.parametrize(
-    "seconds", [pytest.param(10.0, marks=pytest.mark.slow), pytest.param(600.0, marks=pytest.mark.nightly)]
+    "seconds", [pytest.param(5.0, marks=pytest.mark.slow), pytest.param(600.0, marks=pytest.mark.nightly)]
 )
 def test_a_line_at_its_full_rate_loses_nothing(plan_file: Path, tmp_path: Path, monkeypatch, seconds: float) -> None:
     machine, plan = read_machine(MACHINE_FILE), read_inline_plan(plan_file)

@@ -37,7 +37,7 @@ def history(*, tables: int, quantities: int, length: int, changes: int, seed: in
     from studies.history import Size, study
 
     with count_bar("histories") as progress:
-        found = study(Size(tables, quantities, length, FALSE_ALARMS, changes, seed), progress)
+        found = study(Size(tables, quantities, length, FALSE_ALARMS, changes, seed), progress=progress)
     if as_json:
         print_json(found)
     else:

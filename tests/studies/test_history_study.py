@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 
 from dbbstation.history.run_length import chart_for
-from studies.history import Size, stated_share, study
+from studies import history
+from studies.history import Size, stated_share
 from tests.cli.conftest import call
+from tests.once import computed_once
+
+
+@pytest.fixture(autouse=True)
+def study_kept(tmp_path_factory, monkeypatch):
+    """Both tests look at one study."""
+    computed_once(tmp_path_factory, monkeypatch, "studies.history.study")
 
 
 def test_the_stated_share_is_nearly_that_of_a_constant_rate():
@@ -16,7 +24,7 @@ def test_the_stated_share_is_nearly_that_of_a_constant_rate():
 
 
 def test_a_small_study_finds_what_is_large():
-    found = study(Size(tables=20, quantities=2, sessions=60, false_alarms=1e-3, changes=10, seed=3))
+    found = history.study(Size(tables=20, quantities=2, sessions=60, false_alarms=1e-3, changes=10, seed=3))
     delays = {(d["way"], d["change"], d["sessions_before"]): d for d in found["delays"]}
     assert delays["as it is", "step of 10", 200]["found"] == 1.0
     assert delays["as it is", "step of 10", 200]["median_delay"] <= 2.0
@@ -27,7 +35,9 @@ def test_a_small_study_finds_what_is_large():
 
 
 def test_the_command_prints_both_tables():
-    outcome = call("study", "history", "--tables", 20, "--quantities", 2, "--sessions", 40, "--changes", 10)
+    outcome = call(
+        "study", "history", "--tables", 20, "--quantities", 2, "--sessions", 60, "--changes", 10, "--seed", 3
+    )
     assert outcome.code == 0, outcome.err
     assert "sessions scatter by" in outcome.out
     assert "as it is" in outcome.out

@@ -105,10 +105,10 @@ def copies() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def few_parts(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Hold out four parts, the fewest that are judged, instead of ten; the nightly tests hold out all."""
+    """Hold out four parts, the fewest that are judged, instead of ten, and draw tests four times instead of twenty; not in nightly tests."""
     with pytest.MonkeyPatch.context() as patch:
         if "not nightly" in request.config.option.markexpr:
-            patch.setattr("dbbstation.inference.folds.BOUNDS", replace(BOUNDS, folds=4))
+            patch.setattr("dbbstation.inference.folds.BOUNDS", replace(BOUNDS, folds=4, selection_draws=4))
         yield
 
 

@@ -23,6 +23,8 @@ from tests.plant.noise import Noise
 from tests.plant.plan import ALL, EIGHT, subset, table_ii_plan
 from tests.plant.session import MEANS_OF_TWO_HZ, record
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 RINGS = RingingStrut(strut=6, height_um=1.5, period_s=0.5, decay_s=1.2)
 WINDS_UP = GradualBacklash((2.0, 1.0, 2.5, 1.5, 2.0, 1.0), (150.0, 80.0, 200.0, 120.0, 250.0, 100.0))

@@ -14,6 +14,8 @@ from tests.plant.mechanisms.servo import ReversalSpike
 from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 FEW = ("gravity", "backlash", "reversal-spike", "joint-friction")
 NAMES = (*FEW, "servo-lag", "screw-lead")
 ALL = "abcdefghijklmno"

@@ -12,6 +12,8 @@ from tests.plant.mechanisms.weights import BaseCompliance
 from tests.plant.plan import ALL, EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 UM_KN = 1e-6
 

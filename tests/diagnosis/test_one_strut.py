@@ -14,6 +14,8 @@ from tests.plant.mechanisms.servo import ServoLag
 from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 FEW = ("servo-lag", "backlash", "joint-friction")
 """What follows the speed of a strut, and reversals."""
 NAMES = (*FEW, "joint-runout", "platform-joints", "screw-lead")

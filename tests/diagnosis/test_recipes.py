@@ -18,6 +18,8 @@ from tests.diagnosis.engine_sessions import (
     warm_up_of_unknown_time_constant,
 )
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 SURE = 0.95
 RIVALS = ("screw-lead", "strut-weight", "servo-lag", "joint-friction", "platform-joints")
 """Of gravity, backlash and a screw's cyclic error: what acts over the same lengths, loads and reversals."""

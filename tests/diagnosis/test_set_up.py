@@ -22,6 +22,8 @@ from tests.plant.mechanisms.thermal import JigThermal
 from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 NAMES = ("gravity", "screw-lead", "jig-thermal", "tool-ball-offset", "platform-joints", "backlash")
 
 

@@ -18,6 +18,8 @@ from tests.plant.mechanisms.warming import Shop
 from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 NAMES = ("gravity", "backlash", "thermal-struts", "thermal-frame", "spindle-growth", "bar-drift", "jig-thermal")
 FEW = ("thermal-struts", "thermal-frame", "bar-drift")
 SHOP = Shop(rise_k=1.2, time_constant_s=900.0)

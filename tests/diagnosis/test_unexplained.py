@@ -28,7 +28,7 @@ from tests.plant.mechanisms.outsiders import DentedScrew, OddGearWobble, SoftFlo
 from tests.plant.plan import ALL, EIGHT, subset, table_ii_plan
 from tests.plant.session import MEANS_OF_TWO_HZ, record
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("few_parts")]
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 
 

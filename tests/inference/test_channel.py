@@ -67,14 +67,14 @@ def there(findings: tuple[CauseFinding, ...]) -> dict[str, CauseFinding]:
     return {finding.name: finding for finding in findings if finding.verdict in {Verdict.IDENTIFIED, Verdict.HAPPENED}}
 
 
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (2, 3))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 2, 3))])
 def test_nothing_is_claimed_of_white_noise(seed: int) -> None:
     settled = settle(channel(table(seed)))
     assert not there(read_by_levels(settled))
     assert settled.noise.sigma == pytest.approx(0.1, rel=0.06)
 
 
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (2, 3))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 2, 3))])
 def test_nothing_is_claimed_of_noise_whose_neighbours_resemble_each_other(seed: int) -> None:
     settled = settle(channel(table(seed, correlation=0.9)))
     assert not there(read_by_levels(settled))
@@ -107,7 +107,7 @@ def test_whitening_makes_noise_white_that_is_as_it_says() -> None:
         assert np.abs(found - np.eye(len(found))).max() < 0.01
 
 
-@pytest.mark.parametrize("seeds", [2, pytest.param(4, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("seeds", [1, pytest.param(4, marks=pytest.mark.nightly)])
 def test_an_effect_is_found_in_correlated_noise_with_an_honest_size(seeds: int) -> None:
     away = []
     for seed in range(seeds):
@@ -117,7 +117,7 @@ def test_an_effect_is_found_in_correlated_noise_with_an_honest_size(seeds: int) 
     assert np.abs(away).max() < 3.6
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.9])
+@pytest.mark.parametrize("correlation", [pytest.param(0.0, marks=pytest.mark.nightly), 0.9])
 def test_a_pulse_is_found_without_being_told_when(correlation: float) -> None:
     data = table(8, lambda d: 0.4 * ((d.t >= 20.0) & (d.t < 23.0)), correlation=correlation)
     (found,) = there(read_by_levels(settle(channel(data)))).values()

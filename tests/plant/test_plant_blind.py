@@ -169,7 +169,7 @@ def test_three_effects_are_each_seen_beside_the_two_others() -> None:
         assert hidden.answer["size"] >= 1.0 - 1e-9
 
 
-@pytest.mark.parametrize("name", ["gravity", "backlash"])
+@pytest.mark.parametrize("name", ["gravity", pytest.param("backlash", marks=pytest.mark.nightly)])
 def test_faint_effects_are_three_to_seven_standard_deviations_out(name: str) -> None:
     counts = []
     for seed in range(6):

@@ -20,6 +20,8 @@ from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 CANDIDATES = ("gravity", "backlash", "thermal-struts", "bar-drift", "play")
 
 

@@ -22,6 +22,7 @@ from dbbstation.machine.geometry import StrutMasses
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.load import load_sessions
 from dbbstation.trace.columns import currents
+from tests.once import computed_once
 from tests.plant.mechanisms.currents import DriveCurrents
 from tests.plant.mechanisms.gravity import CentreOfGravityShift, Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
@@ -309,7 +310,8 @@ def test_no_currents_and_no_masses_are_refused_by_name(small):
         calibrate(bare, recorded.observations, sources(("strut-reference-length", "drive-friction")))
 
 
-def test_the_command_prints_drives_and_centre_of_gravity(small, tmp_path):
+def test_the_command_prints_drives_and_centre_of_gravity(small, tmp_path, tmp_path_factory, monkeypatch):
+    computed_once(tmp_path_factory, monkeypatch, "dbbstation.tasks.calibrate.calibrate")  # printed, and as JSON
     folder, _ = small
     arguments = ["calibrate", str(folder), "--sources", ",".join(NAMES), "--out", str(tmp_path / "model.yaml")]
     said = CliRunner().invoke(cli, arguments)

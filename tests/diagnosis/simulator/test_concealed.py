@@ -1,5 +1,7 @@
 """Concealed effects in simulators, and twins in which nothing is missing: right or honestly ambiguous, none wrong."""
 
+from dataclasses import replace
+
 import pytest
 
 from tests.diagnosis.simulator.systems import SYSTEMS, asked, verdict_of
@@ -7,8 +9,13 @@ from tests.diagnosis.simulator.systems import SYSTEMS, asked, verdict_of
 pytestmark = pytest.mark.usefixtures("few_parts")
 
 
-def expect_right(name, seed=1):
-    system = SYSTEMS[name]
+def shorter(system, rows):
+    """The same system, recorded for so many rows."""
+    return replace(system, inputs=lambda rng: {name: values[:rows] for name, values in system.inputs(rng).items()})
+
+
+def expect_right(name, seed=1, rows=None):
+    system = shorter(SYSTEMS[name], rows)
     answer = asked(system, seed)
     assert verdict_of(system, answer) == "right", [(f.name, f.verdict, f.probability) for f in answer.findings[:4]]
     found = answer.identified[0]
@@ -35,7 +42,7 @@ def test_a_term_over_a_simulated_level_is_found():
 
 
 def test_a_hardening_spring_is_found_whose_linear_answer_is_far_from_the_true_one():
-    expect_right("hardening spring")
+    expect_right("hardening spring", rows=250)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import numpy as np
 
 from dbbstation.computing.arrays import hypot_of, sum_of
 from dbbstation.inference.harmonics import bands, coefficients, noise_spectrum
+from dbbstation.trace.cut import FINEST_STEP_MM
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
@@ -21,10 +22,7 @@ FEWEST_SAMPLES = 100
 ROUNDING = sqrt(12.0)
 """Step of rounded readings over the standard deviation of rounding [GUM 4.3.7]."""
 
-FINEST_STEP_UM = 0.1
-"""Step of readings that no bar resolves more finely [µm]."""
-
-LEAST_UM = FINEST_STEP_UM / ROUNDING
+LEAST_UM = 1e3 * FINEST_STEP_MM / ROUNDING
 """Least noise, below any real bar [µm]. Computed recordings have less, and any difference would be significant."""
 
 

@@ -52,6 +52,9 @@ LEAST_SHAPE = 8.2
 """Least variance of the overlap's bent shape over that of its noise. Noise alone exceeds it once in 10,000 times (F distribution
 with 6 and 22 degrees of freedom). Less shape matches at any shift: of a machine that stands at a corner, or of a short arc."""
 
+FINEST_STEP_MM = 1e-4
+"""Step of readings that no bar resolves more finely [mm]. The shape of computed recordings has no less noise."""
+
 PIECES = 24
 """Number of pieces of the overlap whose means are compared."""
 
@@ -304,8 +307,9 @@ def _match(
     left = difference - columns @ np.array([offset, late])
     spread = float(np.sum((slope - slope.mean()) ** 2))
     remaining = float(np.sqrt(left @ left / (PIECES - 2)))
-    # A straight shape is an offset at any shift. A mean of two samples has a quarter of the variance of their difference.
-    noise = remaining**2 / 4.0 * len(when) / PIECES
+    # A straight shape is an offset at any shift. A mean of two samples has a quarter of the variance of their difference,
+    # and half of a sample's, which is at least that of rounding [GUM 4.3.7].
+    noise = max(remaining**2 / 4.0 * len(when) / PIECES, FINEST_STEP_MM**2 / 12.0 / 2.0)
     if not np.mean(shape[2:] ** 2) > LEAST_SHAPE * noise:
         return None
     # Each piece is the mean of len(when) / PIECES differences of two samples.

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from dbbstation.circles.analysis import analyse, analyse_pair, refiltered
-from dbbstation.circles.noise import FINEST_STEP_UM
 from dbbstation.circles.path import Filter
 from dbbstation.plan.plan import Circle, Direction
 from dbbstation.trace.analysis import figures, passes_of
+from dbbstation.trace.cut import FINEST_STEP_MM
 from dbbstation.trace.recording import RawCircle, Recording
 
 CCW = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
@@ -220,5 +220,5 @@ def test_without_a_filter_a_path_passes_as_it_is():
 def test_the_least_noise_is_that_of_computed_readings_rounded_to_the_smallest_shape():
     """Lengths that are rounded to 0.1 µm scatter by it: brute force over 100 000 of them."""
     length_mm = np.random.default_rng(9).uniform(150.0, 150.1, 100_000)
-    off_um = 1e3 * length_mm - FINEST_STEP_UM * np.round(1e3 * length_mm / FINEST_STEP_UM)
+    off_um = 1e3 * (length_mm - FINEST_STEP_MM * np.round(length_mm / FINEST_STEP_MM))
     assert analyse(measured(flat)).noise.least_um == pytest.approx(np.std(off_um), rel=0.01)

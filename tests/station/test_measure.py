@@ -120,9 +120,10 @@ def test_a_person_answers_with_keys(plan_file: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_ctrl_c_keeps_everything_and_the_same_command_goes_on(plan_file: Path, tmp_path: Path) -> None:
     out = tmp_path / "session"
-    text = plan_file.read_text(encoding="utf-8").replace("repeat_at_end: [a]\n", "")
+    text = plan_file.read_text(encoding="utf-8").replace("repeat_at_end: [a]\n", "").replace(": 1000", ": 2000")
     plan_file.write_text(re.sub(r"  - \{name: b.*\n", "", text), encoding="utf-8")
-    with bench(plan_file, scale=30.0, rate_hz=20.0) as place:
+    # Slow enough that a busy computer leaves no hole in a circle.
+    with bench(plan_file, scale=10.0, rate_hz=20.0) as place:
         part = out / "runs" / "a-cw-1.csv.part"
         with started(place.command(out), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
             wait_for(lambda: lines_of(part) > 100, process)

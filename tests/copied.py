@@ -177,7 +177,7 @@ def _warm_up() -> None:
 
 
 def _asked(line: socket.socket):
-    """Ends of three pipes, words, folder and environment; None where nobody asks any more."""
+    """Return the ends of three pipes, the words, the folder and the environment of a request; None behind the last."""
     size, ends, *_ = socket.recv_fds(line, 4, 3)
     asked = b""
     while len(asked) < int.from_bytes(size, "big"):

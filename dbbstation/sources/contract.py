@@ -482,7 +482,8 @@ class ErrorSource(ABC):
             else:
                 law_of.further_laws = (*law_of.further_laws, cls)
         cls.further_laws, cls.logged_law = (), None
-        cls.law, cls.simpler_law = law or cls.varies_with, None if extends is None else extends.law
+        cls.law = law or vars(cls).get("law", cls.varies_with)
+        cls.simpler_law = None if extends is None else extends.law
 
     @abstractmethod
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:

@@ -335,7 +335,7 @@ def test_a_table_with_decimal_commas_says_the_same(run, short, tmp_path):
 
 def test_the_table_says_where_it_comes_from(run, short, tmp_path):
     out = tmp_path / "out.csv"
-    table = shutil.copy(short, tmp_path / "another.csv")  # that nobody has read yet
+    table = shutil.copy(short, tmp_path / "another.csv")  # no command has read it
     assert run("mismatch", table, *QUICK, "--table", out).code == DONE
     told = json.loads((tmp_path / "out.csv.provenance.json").read_text())
     assert list(told["inputs"].values()) == [hashlib.sha256(short.read_bytes()).hexdigest()]

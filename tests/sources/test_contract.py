@@ -13,6 +13,7 @@ from dbbstation.catalogue import InFolders
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import Rotation
 from dbbstation.sources import causes
+from dbbstation.sources.causes.gravity import Gravity
 from dbbstation.sources.contract import Effect, ErrorSource, Need, Owner
 from dbbstation.sources.registry import known_sources, sources_named
 from tests.sources.runs import random_machine, random_run
@@ -121,3 +122,14 @@ def test_a_source_is_looked_up_in_its_own_file_alone(monkeypatch):
     assert found["mounting"].name == "mounting"
     assert imported == [f"{causes.__name__}.mounting"]
     assert {name.replace("-", "_") for name in found} == {name.removeprefix(f"{causes.__name__}.") for name in imported}
+
+
+def test_a_law_is_named_by_its_class_or_by_what_the_error_varies_with():
+    class OfForce(Gravity):
+        law = "by a table"
+
+    class OfTime(Gravity):
+        varies_with = "time"
+
+    assert (OfForce.law, OfTime.law, Gravity.law) == ("by a table", "time", Gravity.varies_with)
+    assert [one.law for one in Gravity().other_laws()] == ["contacts"]

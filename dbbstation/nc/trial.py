@@ -11,18 +11,18 @@ import numpy as np
 from dbbstation.errors import StationError
 from dbbstation.machine.geometry import Rotation
 from dbbstation.nc.mark import is_marked, marked
+from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import IN_FORCE, MESSAGE, Ending, RowKind, ToolpathBuilder
 from dbbstation.nc.words import WordDialect
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
-    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.dialect import Dialect
     from dbbstation.nc.toolpath import Toolpath
 
-FIRST = np.array([10.0, -20.0, -1000.0, 1.0, -2.0, 3.0])
-SECOND = np.array([10.5, -20.0, -1000.0, 1.0, -2.0, 3.5])
+MOVES = "G21 G90 G0 X10 Y-20 Z-1000 A1 B-2 C3\nG1 X10.5 C3.5 F600"
+"""First lines of every trial, in LinuxCNC's language: two moves."""
 
 POSE_WITHIN = 1e-3
 """Largest difference between a written and a read pose [mm, deg]; each dialect chooses its decimals."""
@@ -37,20 +37,20 @@ def faults_of(dialect: Dialect) -> list[str]:
     Raises:
         Exception: whatever the dialect raises while it writes moves, or reads what it wrote.
     """
-    moves = _built([_moves])
+    moves = _commanded()
     read = _read(dialect, moves)
-    places = read.poses[read.is_move]
-    if places.shape != (2, 6) or not np.allclose(places, [FIRST, SECOND], atol=POSE_WITHIN):
+    wanted, places = (each.poses[each.is_move] for each in (moves, read))
+    if places.shape != wanted.shape or not np.allclose(places, wanted, atol=POSE_WITHIN):
         return ["it does not read the two moves that it wrote"]
     faults = _differences(moves, read, "two moves")
-    has_words: list[Callable[[ToolpathBuilder], None]] = [_moves]
-    for what, add in THINGS.items():
-        wrote = _built([_moves, add])
+    has_words: list[str] = []
+    for what, lines in THINGS.items():
+        wrote = _commanded(lines)
         try:
             text = dialect.write(wrote)
         except StationError:
             continue  # it has no words for this, and says so
-        has_words.append(add)
+        has_words.append(lines)
         try:
             read = dialect.read(text, "trial" + dialect.extension)
         except StationError as error:
@@ -58,9 +58,14 @@ def faults_of(dialect: Dialect) -> list[str]:
         else:
             faults += _differences(wrote, read, what)
     if not faults:
-        wrote = _built(has_words)
+        wrote = _commanded(*has_words)
         faults = _differences(wrote, _read(dialect, wrote), "all in one program")
-    return faults or _faults_of_guard(dialect, moves) or _faults_of_table(dialect, moves) or _faults_of_mark(dialect)
+    return (
+        faults
+        or _faults_of_guard(dialect, moves)
+        or _faults_of_table(dialect, moves)
+        or _faults_of_mark(dialect, moves)
+    )
 
 
 def _faults_of_table(dialect: Dialect, moves: Toolpath) -> list[str]:
@@ -91,91 +96,40 @@ def _faults_of_guard(dialect: Dialect, moves: Toolpath) -> list[str]:
     return faults
 
 
-def _faults_of_mark(dialect: Dialect) -> list[str]:
-    path = _built([_curve])
-    if is_marked(_read(dialect, marked(path, dialect.decimals))):
+def _faults_of_mark(dialect: Dialect, moves: Toolpath) -> list[str]:
+    turns = np.linspace(0.0, 6.0, 41)[:, None] + np.arange(3.0)
+    poses = moves.poses[0] + np.hstack([20.0 * np.sin(turns), 3.0 * np.cos(turns)])
+    curve = ToolpathBuilder("trial")
+    curve.rapid(poses[0])
+    curve.feed(poses[1:], 600.0)
+    if is_marked(_read(dialect, marked(curve.built(), dialect.decimals))):
         return []
     return [
         f"it cannot be marked: what it writes with {' '.join(map(str, dialect.decimals))} decimals is read otherwise"
     ]
 
 
-def _curve(path: ToolpathBuilder) -> None:
-    turns = np.linspace(0.0, 6.0, 41)[:, None] + np.arange(3.0)
-    poses = FIRST + np.hstack([20.0 * np.sin(turns), 3.0 * np.cos(turns)])
-    path.rapid(poses[0])
-    path.feed(poses[1:], 600.0)
+def _each_moved(*lines: str) -> str:
+    return "\n".join(f"{line}\nG1 X{10 + k} Y-19 C3 F500" for k, line in enumerate(lines))
 
 
-def _from_first(by: list[float]) -> Floats:
-    return FIRST + np.array(by)
-
-
-def _moves(path: ToolpathBuilder) -> None:
-    path.rapid(FIRST)
-    path.feed(SECOND[None], 600.0)
-
-
-def _feeds(path: ToolpathBuilder) -> None:
-    path.feed(FIRST[None], 1234.5)
-    path.feed(_from_first([0, 0, 0, 2, 0, 0])[None], 90.0)
-    path.feed(SECOND[None], 0.25)
-
-
-def _dwell(path: ToolpathBuilder) -> None:
-    path.dwell(0.5)
-    path.dwell(12.25)
-
-
-def _said(kind: RowKind, *texts: str) -> Callable[[ToolpathBuilder], None]:
-    def add(path: ToolpathBuilder) -> None:
-        for number, text in enumerate(texts):
-            path.say(kind, text)
-            path.feed(_from_first([number, 1, 0, 0, 0, 0])[None], 500.0)
-
-    return add
-
-
-def _systems(path: ToolpathBuilder) -> None:
-    path.say(RowKind.SYSTEM, "G55")
-    path.rapid(FIRST)
-
-
-def _machine(path: ToolpathBuilder) -> None:
-    path.rapid(_from_first([0, 0, 50, 0, 0, 0]), in_machine=True)
-    path.rapid(FIRST)
-
-
-def _corners(path: ToolpathBuilder) -> None:
-    for number, corner_mm in enumerate((0.0, 0.02, np.inf)):
-        path.corner_mm = corner_mm
-        path.feed(_from_first([0, 1 + number, 0, 0, 0, 0])[None], 500.0)
-
-
-def _ends(ending: Ending) -> Callable[[ToolpathBuilder], None]:
-    def add(path: ToolpathBuilder) -> None:
-        path.ending = ending
-
-    return add
-
-
-THINGS: dict[str, Callable[[ToolpathBuilder], None]] = {
-    "feeds": _feeds,
-    "dwells": _dwell,
-    "stops": _said(RowKind.PAUSE, "", "turn the part"),
-    "an optional stop": _said(RowKind.OPTIONAL_STOP, ""),
-    "the spindle": _said(RowKind.FUNCTION, "S1200 M3", "M5", "S800.5 M4"),
-    "a slow spindle": _said(RowKind.FUNCTION, "S0.00001 M3"),
-    "coolant": _said(RowKind.FUNCTION, "M8", "M7", "M9"),
-    "a tool": _said(RowKind.FUNCTION, "T2 M6", "M61 Q3"),
-    "a message": _said(RowKind.MESSAGE, "MSG, hello"),
-    "a work system": _systems,
-    "machine coordinates": _machine,
-    "path control": _corners,
-    "an end without M2": _ends(Ending.TEXT),
-    "M30": _ends(Ending.REWIND),
+THINGS = {
+    "feeds": "G1 X10 C3 F1234.5\nG1 A3 F90\nG1 X10.5 Y-20 A1 C3.5 F0.25",
+    "dwells": "G4 P0.5\nG4 P12.25",
+    "stops": _each_moved("M0", f"({MESSAGE}turn the part)\nM0"),
+    "an optional stop": _each_moved("M1"),
+    "the spindle": _each_moved("S1200 M3", "M5", "S800.5 M4"),
+    "a slow spindle": _each_moved("S0.00001 M3"),
+    "coolant": _each_moved("M8", "M7", "M9"),
+    "a tool": _each_moved("T2 M6", "M61 Q3"),
+    "a message": _each_moved(f"({MESSAGE}hello)"),
+    "a work system": "G55\nG0 X10 Y-20",
+    "machine coordinates": "G53 G0 Z-950\nG0 Z-1000",
+    "path control": _each_moved("G61", "G64 P0.02", "G64"),
+    "an end without M2": Ending.TEXT,
+    "M30": Ending.REWIND,
 }
-"""Rows that a program may contain beside two moves."""
+"""Lines that a program may contain behind the two moves, or its ending."""
 
 
 class _Row(NamedTuple):
@@ -192,11 +146,11 @@ class _Row(NamedTuple):
         return " ".join([self.what, *(f"{number:g}" for number in self.numbers)])
 
 
-def _built(things: list[Callable[[ToolpathBuilder], None]]) -> Toolpath:
-    path = ToolpathBuilder("trial")
-    for add in things:
-        add(path)
-    return path.built()
+def _commanded(*things: str) -> Toolpath:
+    lines = [MOVES, *(thing for thing in things if not isinstance(thing, Ending)), "M2"]
+    endings = [thing for thing in things if isinstance(thing, Ending)]
+    path = read_program("\n".join(lines), "trial")
+    return replace(path, holds=None, ending=[path.ending, *endings][-1])
 
 
 def _read(dialect: Dialect, wrote: Toolpath) -> Toolpath:

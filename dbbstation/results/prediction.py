@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 from dbbstation.computing.arrays import Floats
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import finite
-from dbbstation.files.formats.pose_table import POSE_COLUMNS, PoseTable, write_poses
 from dbbstation.files.provenance import Provenance
+from dbbstation.files.recordings.pose_csv import POSE_COLUMNS, PoseTable, write_poses
 from dbbstation.model.identified import pose_errors
 from dbbstation.results.frame import Framed
 from dbbstation.results.model_warnings import model_warnings, unknown_causes

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from dbbstation.files.formats.number_language import NumberLanguage
-    from dbbstation.files.formats.pose_table import PoseTable
+    from dbbstation.files.recordings.pose_csv import PoseTable
     from dbbstation.files.recordings.table_csv import Columns
     from dbbstation.results.prediction import PredictionResult
     from dbbstation.sources.contract import ErrorSource
@@ -103,15 +103,13 @@ def predict(
 def _table(poses: Poses, numbers: NumberLanguage) -> tuple[PoseTable, str]:
     import numpy as np
 
-    from dbbstation.files.formats.pose_table import POSE_COLUMNS, PoseTable, read_poses
+    from dbbstation.files.recordings.pose_csv import POSE_COLUMNS, PoseTable, poses_of, read_poses
     from dbbstation.files.recordings.table_csv import given_table
 
     if isinstance(poses, str | PathLike):
         return read_poses(Path(poses), numbers), str(poses)
     if hasattr(poses, "columns") or isinstance(poses, Mapping):
-        table = given_table(cast("Columns", poses), POSE_COLUMNS, "poses")
-        others = {name: list(table.cells[name]) for name in table.names if name not in POSE_COLUMNS}
-        return PoseTable(np.column_stack([table.values[name] for name in POSE_COLUMNS]), others), "poses"
+        return poses_of(given_table(cast("Columns", poses), POSE_COLUMNS, "poses")), "poses"
     given = np.atleast_2d(np.asarray(cast("ArrayLike", poses), dtype=np.float64))
     if given.ndim != 2 or given.shape[1] != AXES or not np.isfinite(given).all():  # noqa: PLR2004 - rows and columns
         raise ArgumentError(

@@ -269,9 +269,12 @@ def test_files_in_each_others_places(run, fifteen, model):
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("x_mm,y_mm\n1,2\n", ":1:1: no column z_mm, a_deg, b_deg, c_deg"),
-        ("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n", "no pose follows the header"),
-        ("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n0,0,-1008,0,0,nan\n", ":3: c_deg is 'nan', not a number"),
+        ("x_mm,y_mm\n1,2\n", ":1: there is no column `c_deg`; columns here: x_mm, y_mm"),
+        ("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n", ":1: there are no rows below this line"),
+        (
+            "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n0,0,-1008,0,0,nan\n",
+            ":3: c_deg is `nan`, not a finite number",
+        ),
         ("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n900,0,-1008,0,0,0\n", "its travel 0 to 300 mm"),
     ],
 )

@@ -245,7 +245,8 @@ def test_a_number_in_the_other_language_is_refused_and_never_read_as_another(run
     (shop / "poses.csv").write_text("x_mm;y_mm;z_mm;a_deg;b_deg;c_deg\n1.500;0;-1008;0;0;0\n", encoding="utf-8")
     outcome = run("predict", "--model", MODEL, "poses.csv", "--table", "out.csv")
     assert outcome.code == FAILED
-    assert "poses.csv:2: x_mm is '1.500', not a number; the decimal sign is a comma" in outcome.err
+    assert "poses.csv:2: x_mm is `1.500`, not a finite number; " in outcome.err
+    assert "the decimal sign is a comma" in outcome.err
 
 
 BAD = {

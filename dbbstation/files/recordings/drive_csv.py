@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.catalogue import meant
 from dbbstation.errors import MOST_FAULTS, Faults, InputError, Problem, refuse
 from dbbstation.files.formats.number_language import PLAIN
-from dbbstation.files.recordings.table_csv import given_table, parse_table
+from dbbstation.files.recordings.table_csv import given_table, missing_column, parse_table
 from dbbstation.files.source_text import LARGEST_TABLE, first_line, numbered_lines, text_of
 from dbbstation.trace.drive import DriveRecording
 
@@ -111,7 +110,9 @@ def parse_drive(text: str, file: str) -> DriveFile:
 def _checked(table: TableFile, warnings: Faults) -> DriveFile:
     file, header, names = table.file, table.header, list(table.names)
     faults = Faults(file)
-    _check_names(names, header, faults)
+    faults += [missing_column(name, names, file, header) for name in REQUIRED if name not in names]
+    if FORCE not in names and CURRENT not in names:
+        faults.add(f"neither `{FORCE}` nor `{CURRENT}` is there", f"columns here: {', '.join(names)}", header)
     numbers = {name: table.values[name] for name in names if name in LARGEST}
     for name in numbers:
         faults += table.not_finite(name, "correct or remove the line")
@@ -122,18 +123,6 @@ def _checked(table: TableFile, warnings: Faults) -> DriveFile:
         if name not in LARGEST:
             warnings.add(f"the column `{name}` is not known; it is kept and not used", line=header)
     return DriveFile(file, header, numbers, tuple(warnings))
-
-
-def _check_names(names: list[str], line: int, faults: Faults) -> None:
-    shown = f"columns here: {', '.join(names)}"
-    if any(";" in name or "\t" in name for name in names):
-        shown = "commas stand between columns, the decimal sign is a dot"
-    unknown = [name for name in names if name not in LARGEST]
-    for missing in (name for name in REQUIRED if name not in names):
-        remedy = meant(missing, unknown, shown, "is it `{}`?", 0.5)
-        faults.add(f"the column `{missing}` is missing", remedy, line)
-    if FORCE not in names and CURRENT not in names:
-        faults.add(f"neither `{FORCE}` nor `{CURRENT}` is there", shown, line)
 
 
 def _check_values(numbers: dict[str, Floats], lines: list[int], faults: Faults) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from dbbstation.catalogue import meant
 from dbbstation.errors import MOST_FAULTS, Faults, InputError, Problem, refuse
 from dbbstation.files.csv_rows import csv_cells
-from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
+from dbbstation.files.formats.number_language import PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.source_text import LARGEST_TABLE, numbered_lines, shortened, text_of
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats, Integers
 
-SEPARATORS = ",;\t"
 OF_SHEETS = frozenset({"#n/a", "#nv", "#div/0!", "#value!", "#wert!", "#num!", "#zahl!", "#ref!", "#bezug!"})
 """Cells that a spreadsheet could not compute, in small letters."""
 
@@ -106,24 +105,22 @@ def parse_table(text: str, file: str, needed: Iterable[str] = (), numbers: Numbe
     if not lines:
         raise InputError.of(file, "the file has no columns and no rows", "begin with a line of names")
     header, head = lines[0]
-    separator = numbers.separator if numbers else max(SEPARATORS, key=head.count)
-    names = [name.strip() for name in csv_cells(head, separator, file, header)]
-    faults = _faults_of_names(names, needed, file, header)
+    language = numbers or NumberLanguage(separator=max(SEPARATORS, key=head.count))
+    names = [name.strip() for name in csv_cells(head, language.separator, file, header)]
+    faults = _faults_of_names(names, needed, file, header, language)
     if not faults and len(lines) == 1:
         faults.add("there are no rows below this line", line=header)
     rows, places = [], []
     for number, line in lines[1:]:
-        cells = [cell.strip() for cell in csv_cells(line, separator, file, number)]
+        cells = [cell.strip() for cell in csv_cells(line, language.separator, file, number)]
         if len(cells) != len(names):
             what = f"{len(cells)} values in {len(names)} columns"
-            remedy = f"compare the line with the header; {(numbers or PLAIN).text}"
-            faults.add(what, remedy, number)
+            faults.add(what, f"compare the line with the header; {language.text}", number)
             continue
         rows.append(cells)
         places.append(number)
     refuse(faults[:MOST_FAULTS])
     columns = {name: tuple(row[k] for row in rows) for k, name in enumerate(names)}
-    language = numbers or PLAIN
     values = {name: _numbers(column, language) for name, column in columns.items()}
     if language.decimal != PLAIN.decimal:
         columns = {name: _plain(column, values[name], language) for name, column in columns.items()}
@@ -189,13 +186,17 @@ def _seconds(cells: Sequence[str]) -> Floats | None:
         return None
 
 
-def missing_column(name: str, names: Sequence[str], file: str, line: int) -> Problem:
-    """Return the fault of a missing column, and name likely columns."""
-    remedy = meant(name, names, f"columns here: {', '.join(names)}", likeness=0.5)
+def missing_column(name: str, names: Sequence[str], file: str, line: int, language: NumberLanguage = PLAIN) -> Problem:
+    """Return the fault of a missing column, and name likely columns, or the separator if the names contain another."""
+    others = [sign for sign in SEPARATORS if sign != language.separator and any(sign in each for each in names)]
+    shown = language.text if others else f"columns here: {', '.join(names)}"
+    remedy = meant(name, names, shown, likeness=0.5)
     return Problem(file, line, 0, f"there is no column `{name}`", remedy)
 
 
-def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: int) -> Faults:
+def _faults_of_names(
+    names: list[str], needed: Iterable[str], file: str, line: int, language: NumberLanguage = PLAIN
+) -> Faults:
     faults = Faults(file)
     for name, times in sorted(Counter(filter(None, names)).items()):
         if times > 1:
@@ -203,7 +204,7 @@ def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: i
     if "" in names:
         faults.add(f"column {names.index('') + 1} has no name", "name it", line)
     there = set(names)
-    faults += [missing_column(name, names, file, line) for name in dict.fromkeys(needed) if name not in there]
+    faults += [missing_column(name, names, file, line, language) for name in dict.fromkeys(needed) if name not in there]
     return faults
 
 

@@ -73,7 +73,7 @@ def test_a_recording_in_memory_is_that_of_its_file():
     read, memory = identify(file, **asked), identify(given, **asked)
     assert memory.parameters == read.parameters
     assert identify([given], **asked).parameters == read.parameters
-    with pytest.raises(InputError, match="the column `t_s` is missing"):
+    with pytest.raises(InputError, match="there is no column `t_s`"):
         identify({"position_mm": given["position_mm"], "force_n": given["force_n"]})
     with pytest.raises(InputError, match=r"recording 1:2: force_n is ``, not a finite number"):
         identify(given | {"force_n": np.full(len(table), np.nan)})

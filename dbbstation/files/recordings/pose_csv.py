@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import MOST_FAULTS, Faults, InputError, refuse
-from dbbstation.files.csv_rows import csv_rows, csv_text
-from dbbstation.files.formats.number_language import DECIMALS, PLAIN, SEPARATORS, NumberLanguage
+from dbbstation.errors import MOST_FAULTS, refuse
+from dbbstation.files.csv_rows import csv_text
+from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
 from dbbstation.files.provenance import Provenance, write_table
-from dbbstation.files.source_text import LARGEST_TABLE, shortened, text_of
+from dbbstation.files.recordings.table_csv import read_table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from dbbstation.computing.arrays import Floats
+    from dbbstation.files.recordings.table_csv import TableFile
 
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 UNCERTAINTY_COLUMNS = ("u_x_mm", "u_y_mm", "u_z_mm")
@@ -26,7 +26,6 @@ REASON_COLUMN = "u_not_known_because"
 """Column with the reason for empty uncertainties; its cell is empty if all three are known."""
 WARNING_COLUMN = "model_warning"
 """Column with an objection to the model, the same in all rows; absent without one."""
-ELSE = "other tables need --decimal and --separator, or `numbers` in the settings"
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +38,7 @@ class PoseTable:
     """
 
     poses: Floats
-    others: dict[str, list[str]]
+    others: Mapping[str, Sequence[str]]
 
 
 def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
@@ -48,42 +47,17 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
     Raises:
         InputError: every missing column and every cell that is no finite number, with its line.
     """
-    text = text_of(path, LARGEST_TABLE)
-    table = csv_rows(io.StringIO(text, newline=""), language.separator, str(path), skip_spaces=True)
-    _, names = next(table, (1, []))
-    missing = [name for name in POSE_COLUMNS if name not in names]
-    if missing:
-        remedy = f"the first line must name {', '.join(POSE_COLUMNS)}"
-        if any(sign in name for name in names for sign in SEPARATORS if sign != language.separator):
-            remedy += f"; {language.text}: {ELSE}"
-        raise InputError.of(path, f"no column {', '.join(missing)}", remedy, line=1, column=1)
-    faults = Faults(path)
-    rows: list[list[float]] = []
-    others: dict[str, list[str]] = {name: [] for name in names if name not in POSE_COLUMNS}
-    for line, cells in table:
-        if not cells:
-            continue
-        if len(cells) != len(names):
-            what = f"{len(cells)} values in {len(names)} columns"
-            remedy = f"compare the line with the header; {language.text}"
-            faults.add(what, remedy, line)
-            continue
-        row = dict(zip(names, cells, strict=True))
-        rows.append([_number(row[name], name, line, language, faults) for name in POSE_COLUMNS])
-        for name, kept in others.items():
-            kept.append(row[name])
-    refuse(faults[:MOST_FAULTS])
-    if not rows:
-        raise InputError.of(path, "no pose follows the header", "give one pose per line", line=1, column=1)
-    return PoseTable(np.array(rows), others)
+    table = read_table(path, POSE_COLUMNS, language)
+    other = "other tables need --decimal and --separator, or `numbers` in the settings"
+    remedy = f"correct or remove the line; {language.text}: {other}"
+    refuse([fault for name in POSE_COLUMNS for fault in table.not_finite(name, remedy)][:MOST_FAULTS])
+    return poses_of(table)
 
 
-def _number(cell: str, name: str, line: int, language: NumberLanguage, faults: Faults) -> float:
-    value = language.number(cell)
-    if not np.isfinite(value):
-        remedy = f"{language.text}: {ELSE}" if set(cell) & set(DECIMALS) else "correct or remove the line"
-        faults.add(f"{name} is {shortened(cell)!r}, not a number", remedy, line)
-    return value
+def poses_of(table: TableFile) -> PoseTable:
+    """Return the poses of a table that has their columns."""
+    others = {name: table.cells[name] for name in table.names if name not in POSE_COLUMNS}
+    return PoseTable(np.column_stack([table.values[name] for name in POSE_COLUMNS]), others)
 
 
 def write_poses(

@@ -46,17 +46,61 @@ def copies(module: str, loaded: str) -> Iterator[Starter]:
     Args:
         loaded: module that the copied process imports besides.
     """
+    with copied_process(module, loaded) as copied:
+        yield partial(_running, partial(_new, module) if copied is None else partial(_Copy, copied))
+
+
+@contextmanager
+def copied_process(module: str, loaded: str) -> Iterator[CopiedProcess | None]:
+    """Yield the process that is copied; None if processes cannot be copied."""
     if not hasattr(os, "fork"):
-        yield partial(_running, partial(_new, module))
+        yield None
         return
     here, there = multiprocessing.Pipe()
     with there:
         line = there.fileno()
         command = python_module(__name__, str(line), module, loaded)
-        copied = subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[line])  # noqa: S603 - this module
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[line])  # noqa: S603 - this module
     # It ends when its line is closed. Its processor time, and that of all copies, then counts as this process's.
-    with copied, here:
-        yield partial(_running, partial(_Copy, here, {}))
+    with process, here:
+        yield CopiedProcess(here)
+
+
+class CopiedProcess:
+    """The process that is copied, at the end of a line."""
+
+    def __init__(self, line: Connection) -> None:
+        self._line = line
+        self._codes: dict[int, int] = {}
+
+    def begin(self, words: Sequence[str], folder: Path | str, streams: Sequence[int]) -> int:
+        """Begin a copy and return its number.
+
+        Args:
+            streams: its three standard streams, which stay open here.
+        """
+        from multiprocessing.reduction import send_handle  # noqa: PLC0415 - of another kind on Windows
+
+        self._line.send((list(words), str(folder)))
+        for stream in streams:
+            send_handle(self._line, stream, 0)
+        while not (pid := self._told()):
+            pass
+        return pid
+
+    def code_of(self, pid: int, timeout: float | None) -> int | None:
+        """Return the exit code of a copy; None if it still runs after the timeout [s]."""
+        while pid not in self._codes and self._line.poll(timeout):
+            self._told()
+        return self._codes.get(pid)
+
+    def _told(self) -> int:
+        """Return the number of a copy that begins; keep the exit code of one that ends, and return 0."""
+        pid, code = self._line.recv()
+        if code is None:
+            return int(pid)
+        self._codes[pid] = code
+        return 0
 
 
 @contextmanager
@@ -91,29 +135,18 @@ def _new(module: str, words: Sequence[str], folder: Path, *, answers: bool) -> s
 
 
 class _Copy:
-    """A copy of the process at the end of a line, with the names of `subprocess.Popen`.
+    """A copy of a process, with the names of `subprocess.Popen`."""
 
-    Args:
-        codes: exit codes of the copies that have ended, by their numbers.
-    """
-
-    def __init__(
-        self, line: Connection, codes: dict[int, int], words: Sequence[str], folder: Path, *, answers: bool
-    ) -> None:
-        from multiprocessing.reduction import send_handle  # noqa: PLC0415 - of another kind on Windows
-
-        self._line, self._codes = line, codes
-        out, its_out = os.pipe() if answers else (None, open_nothing())
+    def __init__(self, copied: CopiedProcess, words: Sequence[str], folder: Path, *, answers: bool) -> None:
+        self._copied = copied
+        nothing = open_nothing()
+        out, its_out = os.pipe() if answers else (None, nothing)
         err, its_err = os.pipe()
         self.stdout = None if out is None else os.fdopen(out, encoding="locale")
         self.stderr = os.fdopen(err, encoding="locale")
-        line.send((list(words), str(folder)))
-        for end in (its_out, its_err):
-            send_handle(line, end, 0)
+        self._pid = copied.begin(words, folder, (nothing, its_out, its_err))
+        for end in {nothing, its_out, its_err}:
             os.close(end)
-        self._pid = 0
-        while not self._pid:
-            self._pid = self._told()
 
     def communicate(self) -> tuple[str, str]:
         """Return both outputs at their end."""
@@ -138,23 +171,14 @@ class _Copy:
         Raises:
             TimeoutExpired: it still runs.
         """
-        while self._pid not in self._codes:
-            if not self._line.poll(timeout):
-                raise subprocess.TimeoutExpired([], timeout or 0.0)
-            self._told()
-        return self._codes[self._pid]
+        code = self._copied.code_of(self._pid, timeout)
+        if code is None:
+            raise subprocess.TimeoutExpired([], timeout or 0.0)
+        return code
 
     def _send(self, number: signal.Signals) -> None:
         with suppress(ProcessLookupError):
             os.kill(self._pid, number)
-
-    def _told(self) -> int:
-        """Return the number of a copy that begins; keep the exit code of one that ends, and return 0."""
-        pid, code = self._line.recv()
-        if code is None:
-            return int(pid)
-        self._codes[pid] = code
-        return 0
 
 
 def _serve(line: Connection, module: str, loaded: str) -> None:
@@ -177,21 +201,21 @@ def _serve(line: Connection, module: str, loaded: str) -> None:
                     line.send((process.pid, process.exitcode))
                     continue
                 words, folder = line.recv()
-                outputs = [recv_handle(line) for _ in range(2)]
-                process = context.Process(target=_become, args=(line, module, words, folder, outputs))
+                streams = [recv_handle(line) for _ in range(3)]
+                process = context.Process(target=_become, args=(line, module, words, folder, streams))
                 process.start()
                 running[process.sentinel] = process
                 line.send((process.pid, None))
-                for end in outputs:
+                for end in streams:
                     os.close(end)
     for process in running.values():
         process.terminate()
 
 
-def _become(line: Connection, module: str, words: Sequence[str], folder: str, outputs: Sequence[int]) -> None:
+def _become(line: Connection, module: str, words: Sequence[str], folder: str, streams: Sequence[int]) -> None:
     line.close()
     os.chdir(folder)
-    for number, end in enumerate(outputs, start=1):
+    for number, end in enumerate(streams):
         os.dup2(end, number)
         os.close(end)
     sys.argv[1:] = words

@@ -34,8 +34,9 @@ def test_the_ten_tasks_have_types():
     # Beside what mypy has kept of the package, and under one name: mypy looks again only at what has changed since.
     script = NOTEBOOKS[0].parents[1] / ".mypy_cache" / "ten_tasks.py"
     script.parent.mkdir(exist_ok=True)
-    script.write_text("\n\n".join(cells), encoding="utf-8")
-    # From the checkout, for its settings and what its check of types has kept of the package.
-    line = [sys.executable, "-m", "mypy", "--strict", str(script)]
+    # `--strict` on the command line would undo an exception of the settings, and mypy look at the whole package anew, twice.
+    script.write_text("\n\n".join(["# mypy: warn-return-any", *cells]), encoding="utf-8")
+    # From the checkout, for its settings, which are strict, and what its check of types has kept of the package.
+    line = [sys.executable, "-m", "mypy", str(script)]
     done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=NOTEBOOKS[0].parents[1])
     assert done.returncode == 0, done.stdout

@@ -128,7 +128,8 @@ class Sums:
             for step in FINER:
                 near = best + np.arange(-15, 16) * step / extent
                 near = near[near > 0.25 / extent]
-                explained = self.of_forms([Wave(frequency) for frequency in near.tolist()])
+                phase = 2.0 * np.pi * near * self.at[:, None]
+                explained = self.explained(np.stack([np.cos(phase), np.sin(phase)], axis=-1))
                 best = float(near[int(explained.argmax())])  # noqa: PLW2901 - improved twice
             found.append((float(explained.max()), Wave(best)))
         return sorted(found, key=lambda one: -one[0])

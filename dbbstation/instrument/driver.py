@@ -13,7 +13,7 @@ from dbbstation.errors import InstrumentError, StationError
 from dbbstation.instrument import symptoms
 from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage
 from dbbstation.instrument.doubt import Doubts, Piece
-from dbbstation.instrument.link import LineClosedError, adapter_of, open_link, port_of
+from dbbstation.instrument.link import LineClosedError, adapter_of, name_of, open_link, port_of
 from dbbstation.instrument.polling import Poller
 from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.instrument.reception import INCOMPLETE, Reception, Tally
@@ -126,28 +126,36 @@ class Instrument(Closing):
         reconnect_s: float = 0.0,
     ) -> None:
         self.protocol = protocol
-        self.tally = Tally()
         self._port = port
-        self._baud = baud or protocol.line.baud
-        self._clock = clock
         self._log = log
-        self._timeout_s = timeout_s or protocol.timing.timeout_s
-        self._memory_s = memory_s
         self._reconnect_s = reconnect_s
         self._adapter: ListPortInfo | None = None
         self._last_s: float | None = None
         self._away = False
         self._link: Link | None = None
         self._thread: threading.Thread | None = None
-        self._stop = threading.Event()
         self._arrived = threading.Condition()
         self._queue: deque[Reading] = deque()
         self._failure: StationError | None = None
+        self._to = Reception(
+            protocol=protocol,
+            where=name_of(port),
+            baud=baud or protocol.line.baud,
+            clock=clock,
+            timeout_s=timeout_s or protocol.timing.timeout_s,
+            memory_s=memory_s,
+            put=self._put,
+        )
 
     @property
     def where(self) -> str:
         """Return the name of the port."""
-        return self._port if isinstance(self._port, str) else str(getattr(self._port, "name", None) or "open port")
+        return self._to.where
+
+    @property
+    def tally(self) -> Tally:
+        """Return the counts since `start`."""
+        return self._to.tally
 
     @property
     def sees_damage(self) -> bool:
@@ -170,10 +178,10 @@ class Instrument(Closing):
         self._link = self._link or self._open(self._port)
         self._adapter = adapter_of(self._port) if self._reconnect_s and isinstance(self._port, str) else None
         self._last_s, self._away = None, False
-        self._stop.clear()
+        self._to.stop.clear()
         self._queue.clear()
         self._failure = None
-        self.tally = Tally()
+        self._to.tally = Tally()
         try:
             after = self._begin(self._link)
         except StationError:
@@ -192,7 +200,7 @@ class Instrument(Closing):
         """
         if self._thread is None:
             return
-        self._stop.set()
+        self._to.stop.set()
         self._thread.join(_JOIN_S)
         if self._thread.is_alive():
             raise InstrumentError(
@@ -201,7 +209,7 @@ class Instrument(Closing):
         self._thread = None
         if self._link is not None and self._failure is None:
             for step in self.protocol.ask.stop:
-                _command(self._link, step, self._timeout_s)
+                _command(self._link, step, self._to.timeout_s)
 
     def close(self) -> None:
         """Stop and close the line; a given open port and unread readings stay."""
@@ -255,17 +263,17 @@ class Instrument(Closing):
 
     def _open(self, port: str | Port) -> Link:
         protocol = self.protocol
-        return open_link(port, protocol.line, baud=self._baud, log=self._log, text=protocol.is_text)
+        return open_link(port, protocol.line, baud=self._to.baud, log=self._log, text=protocol.is_text)
 
     def _begin(self, link: Link) -> bytes:
         after = b""
         for step in self.protocol.ask.start:
-            after = _command(link, step, self._timeout_s)
+            after = _command(link, step, self._to.timeout_s)
         return after
 
     def _run(self, link: Link, after: bytes) -> None:
         try:
-            while not self._stop.is_set():
+            while not self._to.stop.is_set():
                 try:
                     self._read_on(link, after)
                 except LineClosedError as error:
@@ -279,23 +287,12 @@ class Instrument(Closing):
             self._end(InstrumentError(f"reading failed: {type(error).__name__}: {error}", where=self.where))
 
     def _read_on(self, link: Link, after: bytes) -> None:
-        reception = Reception(
-            protocol=self.protocol,
-            where=self.where,
-            baud=self._baud,
-            clock=self._clock,
-            timeout_s=self._timeout_s,
-            memory_s=self._memory_s,
-            tally=self.tally,
-            stop=self._stop,
-            put=self._put,
-            eighth_bit_marks=link.eighth_bit_marks,
-        )
+        self._to.eighth_bit_marks = link.eighth_bit_marks
         if self.protocol.ask.asked:
             self.tally.reject(after, "bytes")
-            Poller(link, reception).run()
+            Poller(link, self._to).run()
         else:
-            Listener(link, reception).run(after)
+            Listener(link, self._to).run(after)
 
     def _plugged_in_again(self) -> tuple[Link, bytes] | None:
         if self._adapter is None:
@@ -303,7 +300,7 @@ class Instrument(Closing):
         if self._link is not None:
             self._link.close()
         end_s = time.monotonic() + self._reconnect_s
-        while time.monotonic() < end_s and not self._stop.wait(_LOOK_S):
+        while time.monotonic() < end_s and not self._to.stop.wait(_LOOK_S):
             name = port_of(self._adapter)
             if name is None:
                 continue
@@ -318,7 +315,7 @@ class Instrument(Closing):
     def _put(self, reading: Reading) -> None:
         if self._away and self._last_s is not None:
             # Nobody counted while the cable was out: the clock did.
-            missed = round((reading.t_s - self._last_s) * self.protocol.fastest_hz(self._baud)) - 1
+            missed = round((reading.t_s - self._last_s) * self.protocol.fastest_hz(self._to.baud)) - 1
             reading = replace(reading, lost=max(reading.lost, missed, 1))
         self._away, self._last_s = False, reading.t_s
         with self._arrived:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
@@ -160,24 +160,36 @@ class SignField(Schema):
         return self.minus[0] if content.value < 0 else self.plus[0]
 
 
-class ChoiceField(Schema):
-    """One of several codes; the first is written if there is no bad status."""
+class _Codes(Schema):
+    """Codes, each with its meaning; the first is written if none stands for the status."""
 
-    kind: Literal["choice"]
     codes: tuple[Code, ...] = Field(min_length=1)
 
     @model_validator(mode="after")
-    def _codes_differ(self) -> ChoiceField:
+    def _codes_differ(self) -> Self:
         if len({code.code for code in self.codes}) < len(self.codes):
             raise ValueError("two codes are the same bytes")
-        if self.codes[0].status != "ok":
-            raise ValueError("the first code is what the device writes when all is well: its status must be ok")
         return self
 
     @property
     def width(self) -> int | None:
         widths = {len(code.code) for code in self.codes}
         return widths.pop() if len(widths) == 1 else None
+
+    def write(self, content: Content) -> bytes:
+        return next((code.code for code in self.codes if code is content.voice), self.codes[0].code)
+
+
+class ChoiceField(_Codes):
+    """One of several codes; the first is written if there is no bad status."""
+
+    kind: Literal["choice"]
+
+    @model_validator(mode="after")
+    def _first_is_ok(self) -> Self:
+        if self.codes[0].status != "ok":
+            raise ValueError("the first code is what the device writes when all is well: its status must be ok")
+        return self
 
     def pattern(self) -> bytes:
         return (
@@ -190,9 +202,6 @@ class ChoiceField(Schema):
         code = next(code for code in self.codes if code.code == raw)
         found.unit = code.unit or found.unit
         found.report(code.status, code.means, code.remedy)
-
-    def write(self, content: Content) -> bytes:
-        return next((code.code for code in self.codes if code is content.voice), self.codes[0].code)
 
 
 class Flags(Schema):
@@ -269,7 +278,7 @@ class Text(Schema):
         return self.written.ljust(self.width or 0).encode("ascii")
 
 
-class ErrorTable(Schema):
+class ErrorTable(_Codes):
     """Error numbers with meanings; unknown ones are reported as they are.
 
     Attributes:
@@ -277,25 +286,18 @@ class ErrorTable(Schema):
     """
 
     kind: Literal["errors"]
-    codes: tuple[Code, ...] = Field(min_length=1)
 
     @model_validator(mode="after")
-    def _codes_fit(self) -> ErrorTable:
-        if len({len(code.code) for code in self.codes}) > 1 or len({code.code for code in self.codes}) < len(
-            self.codes
-        ):
-            raise ValueError("the codes of errors are of one width, and no two are the same")
+    def _codes_fit(self) -> Self:
+        if self.width is None:
+            raise ValueError("the codes of errors are of one width")
         if any(code.status == "ok" for code in self.codes):
             raise ValueError("an error has a status that is not ok")
         return self
 
-    @property
-    def width(self) -> int:
-        return len(self.codes[0].code)
-
     def pattern(self) -> bytes:
         known = b"|".join(re.escape(code.code) for code in self.codes)
-        return b"(?:" + known + b"|" + _PRINTABLE + b"{%d})" % self.width
+        return b"(?:" + known + b"|" + _PRINTABLE + b"{%d})" % len(self.codes[0].code)
 
     def read(self, raw: bytes, found: FrameParts) -> None:
         code = next((one for one in self.codes if one.code == raw), None)
@@ -303,6 +305,3 @@ class ErrorTable(Schema):
             found.text = f"code {raw.decode('ascii')}, which its protocol file does not list"
             return
         found.status, found.said, found.remedy = code.status, code.means, code.remedy or found.remedy
-
-    def write(self, content: Content) -> bytes:
-        return next((one.code for one in self.codes if one is content.voice), self.codes[0].code)

@@ -146,6 +146,11 @@ def _close_quietly(port: object) -> None:
                 close()
 
 
+def name_of(port: str | Port) -> str:
+    """Return the name of a port for messages."""
+    return port if isinstance(port, str) else str(getattr(port, "name", None) or "open port")
+
+
 def open_link(
     port: str | Port, line: LineSettings, *, baud: int | None = None, log: ByteLog | None = None, text: bool = False
 ) -> Link:
@@ -159,7 +164,7 @@ def open_link(
         InstrumentError: no such port, no permission, in use, or unsupported settings.
     """
     if not isinstance(port, str):
-        return Link(port, name=str(getattr(port, "name", None) or "open port"), owned=False, log=log)
+        return Link(port, name=name_of(port), owned=False, log=log)
     speed = baud or line.baud
     # A pseudo-terminal has no bits: asked a second time for parity, the system finds nothing to change and refuses.
     has_bits = not ("://" not in port and os.path.realpath(port).startswith(("/dev/pts/", "/dev/ttys")))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,6 @@ from dbbstation.instrument import symptoms
 from dbbstation.instrument.codec import LONGEST_LINE
 
 if TYPE_CHECKING:
-    import threading
     from collections.abc import Callable
 
     from dbbstation.errors import InstrumentError
@@ -45,7 +45,7 @@ class Tally:
             self.garbage = self.garbage or raw[:LONGEST_LINE]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Reception:
     """The state of a line while it is read.
 
@@ -62,9 +62,9 @@ class Reception:
     clock: Callable[[], float]
     timeout_s: float
     memory_s: float
-    tally: Tally
-    stop: threading.Event
     put: Callable[[Reading], None]
+    stop: threading.Event = field(default_factory=threading.Event)
+    tally: Tally = field(default_factory=Tally)
     eighth_bit_marks: bool = False
 
     @property

@@ -89,9 +89,7 @@ int main(int n, char **v)
 def main() -> None:
     """Print processor time per call of both."""
     of = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
-    made = component(
-        truth_of(of, "gravity", "screw-lead", "screw-cyclic"), package_text("control/kernel.c"), "dbbkins", "0" * 64
-    )
+    made = component(truth_of(of, "gravity", "screw-lead", "screw-cyclic"), package_text, "dbbkins", "0" * 64)
     with tempfile.TemporaryDirectory() as folder:
         source, program, given = (Path(folder) / name for name in ("cost.c", "cost", "poses"))
         source.write_text(HARNESS % (made.mathematics, *[POSES] * 10))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from string import Template
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ from dbbstation.sources.contract import Need, c_constant
 from dbbstation.sources.laws.weights import masses_for_c, strut_compliance
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -91,7 +92,7 @@ def check_name(name: str) -> None:
 
 def component(
     model: MachineModel,
-    kernel: str,
+    package_text: Callable[[str], str],
     name: str,
     digest: str,
     *,
@@ -101,6 +102,7 @@ def component(
     """Return the component of a model.
 
     Args:
+        package_text: returns a text file of the package by its path.
         digest: SHA-256 of the model file; its first 32 bits are a pin.
         left_out: sources that the control must not correct.
         thermometers: columns without unit that the control has.
@@ -119,9 +121,24 @@ def component(
     machine = model.as_found
     parts = [_part(fitted, machine, thermometers) for fitted in acting if fitted.source.name not in left_out]
     columns = tuple(dict.fromkeys(column for part in parts for column in part.form.thermometers))
+    kernel, frame = (package_text(f"control/{file}") for file in ("kernel.c", "component.comp"))
     mathematics = "\n".join([_constants(machine, parts, columns), kernel, _sources(parts, columns)])
-    text = "\n".join(
-        [_declared(name, machine, parts, columns, digest), mathematics, _WRAPPED + _pins(parts, columns, digest)]
+    watched = (
+        f"    if (thermometer({k}, {column}_temp_c, {column}_zero_c, patience_s)) return THERMOMETER;\n"
+        for k, column in enumerate(columns)
+    )
+    text = Template(frame).substitute(
+        name=name,
+        machine=re.sub(r'["\\\x00-\x1f]', " ", machine.name),
+        digest=digest,
+        short=digest[:12],
+        first=digest[:8],
+        patience=repr(PATIENCE_S),
+        pins=_pins(parts, columns),
+        mathematics=mathematics,
+        thermometer=_THERMOMETER.replace("COUNT", str(len(columns))) if columns else "",
+        switches="".join(f"        use[{k}] = use_{part.name};\n" for k, part in enumerate(parts)),
+        watched="".join(watched),
     )
     out = tuple(one for one in names if one in left_out)
     return Component(name, text, mathematics, tuple(part.fitted.source.name for part in parts), out, columns)
@@ -183,8 +200,7 @@ def _sources(parts: Sequence[_Part], columns: Sequence[str]) -> str:
     return "\n".join(functions)
 
 
-def _declared(name: str, machine: Machine, parts: Sequence[_Part], columns: Sequence[str], digest: str) -> str:
-    said = re.sub(r'["\\\x00-\x1f]', " ", machine.name)
+def _pins(parts: Sequence[_Part], columns: Sequence[str]) -> str:
     pins = [
         f'pin in bit use_{part.name} = 1 "correct {part.fitted.source.name}; taken while enabled is false";'
         for part in parts
@@ -192,94 +208,7 @@ def _declared(name: str, machine: Machine, parts: Sequence[_Part], columns: Sequ
     for column in columns:
         pins.append(f'pin in float {column}_temp_c "thermometer [degC]";')
         pins.append(f'param rw float {column}_zero_c = -999 "its reading from which growth counts [degC]";')
-    return f"""component {name} "Kinematics of {said} with the errors of the model {digest[:12]}";
-description "Made by dbbstation from a model; do not edit. Model SHA-256 {digest}.";
-pin in bit enabled "connect to motion.motion-enabled: switches are taken while it is false";
-pin out u32 model "first 32 bits of the model's SHA-256";
-pin out u32 fault "the last one since the machine was switched on: 0 none, 1 a strut leaves its range, 2 no convergence or the machine is about to fold, 3 a thermometer stands still or is out of range";
-pin out u32 iterations "rounds of the last call";
-pin out float correction-#[6] "joint less that of the nominal machine [mm]";
-param rw float patience_s = {PATIENCE_S!r} "a thermometer that stands still for so long is a fault";
-{chr(10).join(pins)}
-option singleton yes;
-function check nofp "does nothing; halcompile wants one";
-license "GPL"; // version 2 or later, as LinuxCNC that it is built for
-author "dbbstation";
-;;
-#include <rtapi_math.h>
-#include <kinematics.h>
-"""
-
-
-_WRAPPED = """
-FUNCTION(check) { }
-
-static int settled(struct __comp_state *__comp_inst);
-
-static int answered(struct __comp_state *__comp_inst, int wrong)
-{
-    if (wrong) fault = wrong; /* the way back to joints that are right must not hide it */
-    iterations = rounds;
-    return wrong ? -1 : 0;
-}
-
-int kinematicsInverse(const EmcPose *world, double *joint, const KINEMATICS_INVERSE_FLAGS *iflags, KINEMATICS_FORWARD_FLAGS *fflags)
-{
-    struct __comp_state *__comp_inst = __comp_first_inst;
-    double pose[6] = {world->tran.x, world->tran.y, world->tran.z, world->a, world->b, world->c}, r[3][3];
-    seen_t plain;
-    int wrong = settled(__comp_inst);
-    if (!wrong) wrong = dbb_inverse(pose, joint);
-    if (!wrong) {
-        rotation(pose + 3, r), look(Q, P, pose, r, &plain);
-        EACH correction(i) = joint[i] + REFERENCE[i] - plain.length[i];
-    }
-    return answered(__comp_inst, wrong);
-}
-
-int kinematicsForward(const double *joint, EmcPose *world, const KINEMATICS_FORWARD_FLAGS *fflags, KINEMATICS_INVERSE_FLAGS *iflags)
-{
-    struct __comp_state *__comp_inst = __comp_first_inst;
-    double pose[6] = {world->tran.x, world->tran.y, world->tran.z, world->a, world->b, world->c};
-    int homed = 0, wrong;
-    EACH homed = homed || joint[i] != 0.0;
-    if (!homed) return -1; /* before homing: no pose, and no fault */
-    wrong = settled(__comp_inst);
-    if (!wrong) wrong = dbb_forward(joint, pose);
-    if (!wrong) {
-        world->tran.x = pose[0], world->tran.y = pose[1], world->tran.z = pose[2];
-        world->a = pose[3], world->b = pose[4], world->c = pose[5];
-    }
-    return answered(__comp_inst, wrong);
-}
-
-KINEMATICS_TYPE kinematicsType(void) { return KINEMATICS_BOTH; }
-KINS_NOT_SWITCHABLE
-EXPORT_SYMBOL(kinematicsType);
-EXPORT_SYMBOL(kinematicsForward);
-EXPORT_SYMBOL(kinematicsInverse);
-"""
-
-
-def _pins(parts: Sequence[_Part], columns: Sequence[str], digest: str) -> str:
-    switches = "".join(f"        use[{k}] = use_{part.name};\n" for k, part in enumerate(parts))
-    watched = "".join(
-        f"    if (thermometer({k}, {column}_temp_c, {column}_zero_c, patience_s)) return THERMOMETER;\n"
-        for k, column in enumerate(columns)
-    )
-    watching = _THERMOMETER.replace("COUNT", str(len(columns))) if columns else ""
-    return f"""{watching}
-static int settled(struct __comp_state *__comp_inst)
-{{
-    static int was_enabled;
-    model = 0x{digest[:8]}u;
-    if (enabled && !was_enabled) fault = FINE;
-    was_enabled = enabled;
-    if (!enabled) {{
-{switches}    }}
-{watched}    return FINE;
-}}
-"""
+    return "\n".join(pins)
 
 
 _THERMOMETER = f"""

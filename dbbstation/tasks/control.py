@@ -81,7 +81,7 @@ def kinematics(
     identified, digest = _read(model, known, machine), sha256_of(model)
     made = component(
         identified.model,
-        package_text("control/kernel.c"),
+        package_text,
         out.stem,
         digest,
         left_out=left_out,

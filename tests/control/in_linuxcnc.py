@@ -28,7 +28,7 @@ NAME = "dbbtestkins"
 
 def installed(model: MachineModel, folder: Path, digest: str = "0" * 64) -> AbstractContextManager[None]:
     """Build and install the component of a model; it is removed at the end."""
-    made = component(model, package_text("control/kernel.c"), NAME, digest)
+    made = component(model, package_text, NAME, digest)
     (folder / f"{NAME}.comp").write_text(made.text)
     return installed_component(folder / f"{NAME}.comp")
 

@@ -38,7 +38,7 @@ STEP_MM = 1.5 * FEED / 60.0 / 1000.0
 
 def told(model: MachineModel, steps: list[str], folder: Path) -> tuple[list[dict[str, object]], np.ndarray]:
     """What came of each step, and the joints of all servo cycles, shape (n, 6) [mm]."""
-    made = component(model, package_text("control/kernel.c"), NAME, "0" * 64, thermometers=THERMOMETERS)
+    made = component(model, package_text, NAME, "0" * 64, thermometers=THERMOMETERS)
     (folder / f"{NAME}.comp").write_text(made.text)
     zero = (f"setp {NAME}.machine-zero-c 20", f"setp {NAME}.machine-temp-c 20") if made.thermometers else ()
     kins = made_kins(model.machine, NAME, *zero)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,13 +40,8 @@ TOLERANCE = 0.1 * NM
 POSES = 500
 
 
-@cache
-def kernel() -> str:
-    return package_text("control/kernel.c")
-
-
 def made_of(model: MachineModel, **more: tuple[str, ...]) -> Component:
-    return component(model, kernel(), "dbbkins", DIGEST, **more)
+    return component(model, package_text, "dbbkins", DIGEST, **more)
 
 
 def wanted(of: Machine, count: int, seed: int) -> Motion:
@@ -136,7 +130,7 @@ def test_a_thermometer_that_the_control_lacks_is_named(reference: Machine) -> No
 @pytest.mark.parametrize("name", ["Kins", "1kins", "my-kins", "int", "k" * 21, ""])
 def test_a_name_that_is_not_c_is_refused(name: str, reference: Machine) -> None:
     with pytest.raises(StationError, match="cannot be the name of a component in C"):
-        component(MachineModel(reference), kernel(), name, DIGEST)
+        component(MachineModel(reference), package_text, name, DIGEST)
 
 
 def test_a_source_that_is_not_there_cannot_be_left_out(reference: Machine) -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Literal, Self, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
-from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
+from pydantic import BeforeValidator, Field, PlainSerializer
 
-from dbbstation.files.yaml.schema import Schema
+from dbbstation.files.yaml.schema import Rules, Schema
 from dbbstation.instrument.reading import SEVERITY, SaidStatus, Status
 
 Unit: TypeAlias = Literal["mm", "um", "nm", "m", "inch", "count"]
@@ -142,11 +142,9 @@ class SignField(Schema):
     plus: tuple[Bytes, ...] = (b"+",)
     minus: tuple[Bytes, ...] = (b"-",)
 
-    @model_validator(mode="after")
-    def _one_byte_each(self) -> SignField:
-        if not self.plus or not self.minus or any(len(code) != 1 for code in self.plus + self.minus):
-            raise ValueError("plus and minus list single characters, at least one each")
-        return self
+    def _rules(self) -> Rules:
+        wrong = not self.plus or not self.minus or any(len(code) != 1 for code in self.plus + self.minus)
+        yield wrong, "plus and minus list single characters, at least one each"
 
     width: ClassVar[int] = 1
 
@@ -165,11 +163,8 @@ class _Codes(Schema):
 
     codes: tuple[Code, ...] = Field(min_length=1)
 
-    @model_validator(mode="after")
-    def _codes_differ(self) -> Self:
-        if len({code.code for code in self.codes}) < len(self.codes):
-            raise ValueError("two codes are the same bytes")
-        return self
+    def _rules(self) -> Rules:
+        yield len({code.code for code in self.codes}) < len(self.codes), "two codes are the same bytes"
 
     @property
     def width(self) -> int | None:
@@ -185,11 +180,10 @@ class ChoiceField(_Codes):
 
     kind: Literal["choice"]
 
-    @model_validator(mode="after")
-    def _first_is_ok(self) -> Self:
-        if self.codes[0].status != "ok":
-            raise ValueError("the first code is what the device writes when all is well: its status must be ok")
-        return self
+    def _rules(self) -> Rules:
+        yield from super()._rules()
+        what = "the first code is what the device writes when all is well: its status must be ok"
+        yield self.codes[0].status != "ok", what
 
     def pattern(self) -> bytes:
         return (
@@ -262,11 +256,9 @@ class Text(Schema):
     max_width: int = Field(default=40, ge=1, le=80)
     written: str = Field(min_length=1)
 
-    @model_validator(mode="after")
-    def _fits(self) -> Text:
-        if len(self.written) > (self.width or self.max_width) or not self.written.isascii():
-            raise ValueError("`written` must be ASCII and fit into the width")
-        return self
+    def _rules(self) -> Rules:
+        wide = len(self.written) > (self.width or self.max_width)
+        yield wide or not self.written.isascii(), "`written` must be ASCII and fit into the width"
 
     def pattern(self) -> bytes:
         return _PRINTABLE + (b"{%d}" % self.width if self.width else b"{1,%d}" % self.max_width)
@@ -287,13 +279,10 @@ class ErrorTable(_Codes):
 
     kind: Literal["errors"]
 
-    @model_validator(mode="after")
-    def _codes_fit(self) -> Self:
-        if self.width is None:
-            raise ValueError("the codes of errors are of one width")
-        if any(code.status == "ok" for code in self.codes):
-            raise ValueError("an error has a status that is not ok")
-        return self
+    def _rules(self) -> Rules:
+        yield from super()._rules()
+        yield self.width is None, "the codes of errors are of one width"
+        yield any(code.status == "ok" for code in self.codes), "an error has a status that is not ok"
 
     def pattern(self) -> bytes:
         known = b"|".join(re.escape(code.code) for code in self.codes)

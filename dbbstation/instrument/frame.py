@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
-from dbbstation.files.yaml.schema import Schema
+from dbbstation.files.yaml.schema import Rules, Schema
 from dbbstation.instrument.checksum_part import Checksum
 from dbbstation.instrument.fields import (
     ChoiceField,
@@ -117,16 +117,13 @@ class Frame(Schema):
     def _number_of(self, what: str) -> Number | None:
         return next((part for part in self.parts if isinstance(part, Number) and part.of == what), None)
 
-    def fault(self) -> str:
-        """Return the frame's inconsistency, or an empty text."""
+    def _rules(self) -> Rules:
         kinds = [part.of for part in self.parts if isinstance(part, Number)]
-        if kinds.count("length") > 1 or kinds.count("counter") > 1:
-            return "a frame has at most one length and one counter"
-        if self.is_message and (self.status == "ok" or not self.means):
-            return "a frame without a length is a message: give it a status that is not ok, and means"
-        if self.bare and any(not isinstance(part, Literally) for part in self.parts):
-            return "a bare frame has fixed bytes only: nothing else says where it ends"
-        return ""
+        yield len(set(kinds)) < len(kinds), "a frame has at most one length and one counter"
+        silent = self.is_message and (self.status == "ok" or not self.means)
+        yield silent, "a frame without a length is a message: give it a status that is not ok, and means"
+        varies = self.bare and any(not isinstance(part, Literally) for part in self.parts)
+        yield varies, "a bare frame has fixed bytes only: nothing else says where it ends"
 
     @property
     def width(self) -> int | None:

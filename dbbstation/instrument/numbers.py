@@ -6,15 +6,12 @@ import math
 import re
 import struct
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from dbbstation.files.yaml.schema import Schema
+from dbbstation.files.yaml.schema import Rules, Schema
 from dbbstation.instrument.fields import Code, Content, FrameParts, NotRepresentable, NotUnderstood
-
-if TYPE_CHECKING:
-    from typing import Self
 
 
 class Number(Schema):
@@ -30,11 +27,11 @@ class Number(Schema):
     scale: float = Field(default=1.0, gt=0.0)
     specials: tuple[Code, ...] = ()
 
-    @model_validator(mode="after")
-    def _modulus_with_counter(self) -> Self:
-        if (self.of == "counter") != (self.modulus is not None):
-            raise ValueError("a modulus is for counters only")
-        return self
+    def _rules(self) -> Rules:
+        yield (self.of == "counter") != (self.modulus is not None), "a modulus is for counters only"
+        width = getattr(self, "width", None)
+        narrow = width and any(len(special.code) != width for special in self.specials)
+        yield narrow, "write each special code with as many characters as its field has"
 
     def pattern(self) -> bytes:
         specials = b"".join(re.escape(special.code) + b"|" for special in self.specials)
@@ -114,12 +111,6 @@ class DecimalText(Number):
     min_width: int = Field(default=0, ge=0)
     leading_zero: bool = True
 
-    @model_validator(mode="after")
-    def _specials_fit(self) -> Self:
-        if self.width and any(len(special.code) != self.width for special in self.specials):
-            raise ValueError("write each special code with as many characters as its field has")
-        return self
-
     binary: ClassVar[bool] = False
 
     def rounded(self, value: float) -> float:
@@ -183,19 +174,15 @@ class Integer(Number):
     tags: tuple[int, ...] = ()
     payload_bits: int = Field(default=8, ge=1, le=8)
 
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        if bool(self.tags) != (self.payload_bits < 8):  # noqa: PLR2004 (bits of a byte)
-            raise ValueError("give tags together with payload_bits below 8")
-        if self.tags and (len(self.tags) != self.size or self.written != "binary"):
-            raise ValueError("one tag per byte, and only for binary numbers")
-        if any(tag & ((1 << self.payload_bits) - 1) or not 0 <= tag <= 255 for tag in self.tags):  # noqa: PLR2004
-            raise ValueError("a tag uses only the bits above payload_bits")
-        if self.signed and self.written == "bcd":
-            raise ValueError("packed BCD has no sign of its own: use a sign part")
-        if any(len(special.code) != self.width for special in self.specials):
-            raise ValueError("write each special code with as many characters as its field has")
-        return self
+    def _rules(self) -> Rules:
+        tagged, low = bool(self.tags), (1 << self.payload_bits) - 1
+        yield tagged != (self.payload_bits < 8), "give tags together with payload_bits below 8"  # noqa: PLR2004 (bits of a byte)
+        per_byte = len(self.tags) == self.size and self.written == "binary"
+        yield tagged and not per_byte, "one tag per byte, and only for binary numbers"
+        beyond = any(tag & low or not 0 <= tag <= 255 for tag in self.tags)  # noqa: PLR2004
+        yield beyond, "a tag uses only the bits above payload_bits"
+        yield self.signed and self.written == "bcd", "packed BCD has no sign of its own: use a sign part"
+        yield from super()._rules()
 
     @property
     def width(self) -> int:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import Field, StringConstraints
 
-from dbbstation.files.yaml.schema import Schema
+from dbbstation.files.yaml.schema import Rules, Schema
 from dbbstation.instrument.fields import Bytes, Content, Literally, Unit
 from dbbstation.instrument.frame import Frame  # noqa: TC001 (pydantic needs it at run time)
 from dbbstation.instrument.reading import SEVERITY, Status
@@ -76,12 +76,9 @@ class FollowUp(Schema):
     request: Bytes = Field(min_length=1)
     frames: tuple[Frame, ...] = Field(min_length=1)
 
-    @model_validator(mode="after")
-    def _messages(self) -> FollowUp:
-        fault = next(filter(None, (frame.fault() for frame in self.frames)), "")
-        if fault or not all(frame.is_message for frame in self.frames):
-            raise ValueError(fault or "a reply after a fault is a message without a length")
-        return self
+    def _rules(self) -> Rules:
+        told = all(frame.is_message for frame in self.frames)
+        yield not told, "a reply after a fault is a message without a length"
 
 
 class Ask(Schema):
@@ -99,13 +96,10 @@ class Ask(Schema):
     stop: tuple[LineCommand, ...] = ()
     follow_up: FollowUp | None = None
 
-    @model_validator(mode="after")
-    def _request_fits(self) -> Ask:
-        if self.asked != bool(self.request):
-            raise ValueError("modes poll and latch have request bytes, mode stream has none")
-        if self.follow_up is not None and not self.asked:
-            raise ValueError("a streaming device takes no requests, also after a fault")
-        return self
+    def _rules(self) -> Rules:
+        yield self.asked != bool(self.request), "modes poll and latch have request bytes, mode stream has none"
+        told = self.follow_up is not None and not self.asked
+        yield told, "a streaming device takes no requests, also after a fault"
 
     @property
     def asked(self) -> bool:
@@ -148,15 +142,11 @@ class Length(Schema):
     relative: bool = False
     zero_mm: float = 0.0
 
-    @model_validator(mode="after")
-    def _count_has_size(self) -> Length:
-        if (self.unit == "count") != (self.mm_per_count is not None):
-            raise ValueError("give mm_per_count with the unit count only")
-        if self.range_mm[0] >= self.range_mm[1]:
-            raise ValueError("range_mm is [lowest, highest]")
-        if self.zero_mm and not self.relative:
-            raise ValueError("zero_mm goes with relative: true")
-        return self
+    def _rules(self) -> Rules:
+        has_size = self.mm_per_count is not None
+        yield (self.unit == "count") != has_size, "give mm_per_count with the unit count only"
+        yield self.range_mm[0] >= self.range_mm[1], "range_mm is [lowest, highest]"
+        yield self.zero_mm and not self.relative, "zero_mm goes with relative: true"
 
     def mm_per_unit(self, unit: Unit | None = None) -> float:
         """Return the factor to mm, with the sense."""
@@ -185,14 +175,11 @@ class Timing(Schema):
     timeout_s: float = Field(gt=0.0, le=60.0)
     retries: int = Field(default=2, ge=0, le=10)
 
-    @model_validator(mode="after")
-    def _bounds_in_order(self) -> Timing:
-        if self.latch_bounds_s is None:
-            return self
-        earliest_s, latest_s = self.latch_bounds_s
-        if not 0.0 <= earliest_s <= latest_s or self.latch_delay_s:
-            raise ValueError("write latch_bounds_s as [earliest, latest], both at least 0, and leave latch_delay_s out")
-        return self
+    def _rules(self) -> Rules:
+        if self.latch_bounds_s is not None:
+            earliest_s, latest_s = self.latch_bounds_s
+            remedy = "write latch_bounds_s as [earliest, latest], both at least 0, and leave latch_delay_s out"
+            yield not 0.0 <= earliest_s <= latest_s or self.latch_delay_s, remedy
 
 
 class Reference(Schema):
@@ -227,23 +214,15 @@ class Protocol(Schema):
     frames: tuple[Frame, ...] = Field(min_length=1)
     timing: Timing
 
-    @model_validator(mode="after")
-    def _frames_can_be_told_apart(self) -> Protocol:
-        fault = next(filter(None, (frame.fault() for frame in self.frames)), "")
-        if fault:
-            raise ValueError(fault)
-        if self.frames[0].is_message or not all(frame.is_message for frame in self.frames[1:]):
-            raise ValueError("only the first frame carries the length")
+    def _rules(self) -> Rules:
+        alone = not self.frames[0].is_message and all(frame.is_message for frame in self.frames[1:])
+        yield not alone, "only the first frame carries the length"
         whole = self.whole()
-        if not whole.by_width and not whole.terminator:
-            raise ValueError(
-                "every frame ends in the same literal, or every frame has a fixed width: otherwise the end of a frame is unknown"
-            )
-        if self.line.data_bits == 7 and any(frame.binary for frame in whole.frames):  # noqa: PLR2004 (bits)
-            raise ValueError("binary parts need 8 data bits")
-        if self.ask.mode == "stream" and self.timing.rate_hz is None:
-            raise ValueError("a stream needs timing.rate_hz")
-        return self
+        ends = "every frame ends in the same literal, or every frame has a fixed width"
+        yield not (whole.by_width or whole.terminator), f"{ends}: otherwise the end of a frame is unknown"
+        seven = self.line.data_bits == 7  # noqa: PLR2004 (bits)
+        yield seven and any(frame.binary for frame in whole.frames), "binary parts need 8 data bits"
+        yield self.ask.mode == "stream" and self.timing.rate_hz is None, "a stream needs timing.rate_hz"
 
     def whole(self) -> Protocol:
         """Return the protocol with the common parts inserted into requests and replies."""

@@ -6,20 +6,19 @@ import math
 import re
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from dbbstation.facts.quantities import BarMm, Quantity, Text, complaint
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.number_language import number_language
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
+from dbbstation.files.yaml.schema import Rules, Schema, format_of, read_document, validate
 from dbbstation.trace import columns
 from dbbstation.trace.columns import ColumnKind
 
 if TYPE_CHECKING:
     from pathlib import Path
-    from typing import Self
 
     from dbbstation.errors import Problem
     from dbbstation.files.formats.number_language import NumberLanguage
@@ -84,15 +83,12 @@ class ColumnSchema(Schema):
     unit: str | None = None
     """Unit of its numbers; absent if the column is a text, a count or ignored."""
 
-    @model_validator(mode="after")
-    def _has_unit(self) -> Self:
-        known = UNITS.get(self.means)
-        if known is None and self.unit is not None:
-            raise complaint(f"a column that is `{self.means}` has no unit")
-        if known is not None and self.unit not in known:
-            said = "needs a unit" if self.unit is None else f"cannot have the unit `{self.unit}`"
-            raise complaint(f"a column that is `{self.means}` {said}; give one of {', '.join(known)}")
-        return self
+    def _rules(self) -> Rules:
+        known = UNITS.get(self.means, {})
+        yield self.unit is not None and not known, f"a column that is `{self.means}` has no unit"
+        said = "needs a unit" if self.unit is None else f"cannot have the unit `{self.unit}`"
+        one = f"a column that is `{self.means}` {said}; give one of {', '.join(known)}"
+        yield known and self.unit not in known, one
 
 
 class AngleSchema(Schema):
@@ -141,33 +137,23 @@ class MappingFile(Schema):
     """Time zone of dates without one, such as `Europe/Berlin` or hours and minutes from UTC; absent: the importing
     computer's."""
 
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
+    def _rules(self) -> Rules:
         meanings = [column.means for column in self.columns.values()]
         for one in sorted({m for m in meanings if m != IGNORED and meanings.count(m) > 1}):
-            raise complaint(f"two columns are `{one}`; mark one of them as `ignored`")
-        if LENGTH in meanings and DEVIATION in meanings:
-            raise complaint("length and deviation are the same quantity; mark one as `ignored`")
-        if LENGTH not in meanings and DEVIATION not in meanings:
-            raise complaint("no column is `length` or `deviation`")
-        if TIME not in meanings and ANGLE not in meanings:
-            raise complaint("no column is `time` or `angle`")
-        if ANGLE in meanings and self.angle is None:
-            raise complaint("a column is an angle: `angle` must state where 0 is and in which direction it grows")
-        if DEVIATION in meanings and self.zero_mm is None:
-            raise complaint("a column is a deviation: `zero_mm` must state the length of deviation 0")
-        if ANGLE not in meanings and self.trace is None:
-            raise complaint("there are no angles: `trace` has to be `whole` or `turn`")
-        self._split_has_what_it_needs(meanings)
-        if self.separator == "comma" and self.decimal == ",":
-            raise complaint("decimal sign and separator are both a comma")
-        return self
-
-    def _split_has_what_it_needs(self, meanings: list[str]) -> None:
-        if (self.split == "column") != (RUN in meanings):
-            raise complaint("`split: column` and a column that is `run` belong together")
-        if self.split == "direction" and ANGLE not in meanings:
-            raise complaint("`split: direction` needs a column that is an angle")
+            yield True, f"two columns are `{one}`; mark one of them as `ignored`"
+        length, deviation, time, angle = (one in meanings for one in (LENGTH, DEVIATION, TIME, ANGLE))
+        yield length and deviation, "length and deviation are the same quantity; mark one as `ignored`"
+        yield not (length or deviation), "no column is `length` or `deviation`"
+        yield not (time or angle), "no column is `time` or `angle`"
+        must = "`angle` must state where 0 is and in which direction it grows"
+        yield angle and self.angle is None, f"a column is an angle: {must}"
+        must = "`zero_mm` must state the length of deviation 0"
+        yield deviation and self.zero_mm is None, f"a column is a deviation: {must}"
+        yield not angle and self.trace is None, "there are no angles: `trace` has to be `whole` or `turn`"
+        both = "`split: column` and a column that is `run` belong together"
+        yield (self.split == "column") != (RUN in meanings), both
+        yield self.split == "direction" and not angle, "`split: direction` needs a column that is an angle"
+        yield self.separator == "comma" and self.decimal == ",", "decimal sign and separator are both a comma"
 
     @property
     def numbers(self) -> NumberLanguage | None:

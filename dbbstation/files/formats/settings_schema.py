@@ -2,10 +2,10 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from dbbstation.facts.quantities import BarMm, Ordinal, Quantity, TemperatureDegc, Text, complaint
-from dbbstation.files.yaml.schema import Schema
+from dbbstation.facts.quantities import BarMm, Ordinal, Quantity, TemperatureDegc, Text
+from dbbstation.files.yaml.schema import Rules, Schema
 from dbbstation.nc.limits import LARGEST_ALLOWED_MM
 from dbbstation.plan.plan import Direction
 from dbbstation.plan.tolerance import FILTERED, OF_BOTH_DIRECTIONS, USUAL_UPR, CircleFigure, Tolerance
@@ -58,11 +58,9 @@ class NumberSettings(Schema):
     separator: Literal[",", ";", "\t"] | None = None
     """Separator of columns; absent: a semicolon with decimal commas, else a comma."""
 
-    @model_validator(mode="after")
-    def _apart(self) -> "NumberSettings":
-        if self.decimal is not None and self.decimal == self.separator:
-            raise complaint("decimal sign and separator are both a comma; give `;` or a tab")
-        return self
+    def _rules(self) -> Rules:
+        same = self.decimal is not None and self.decimal == self.separator
+        yield same, "decimal sign and separator are both a comma; give `;` or a tab"
 
 
 class ToleranceSettings(Schema):
@@ -82,15 +80,13 @@ class ToleranceSettings(Schema):
     """Filter of G, F, G(b) and H: `none`, or its cut-off in undulations per revolution; absent: 30. It is Gaussian, but
     sharp at 30."""
 
-    @model_validator(mode="after")
-    def _plausible(self) -> "ToleranceSettings":
+    def _rules(self) -> Rules:
         figure = CircleFigure(self.quantity)
-        if self.directions and figure in OF_BOTH_DIRECTIONS:
-            raise complaint(f"{self.quantity} is of both directions: leave `directions` out")
-        if self.filter is not None and figure not in FILTERED:
-            raise complaint(f"no filter acts on {self.quantity}: leave `filter` out")
+        both = self.directions and figure in OF_BOTH_DIRECTIONS
+        yield both, f"{self.quantity} is of both directions: leave `directions` out"
+        unfiltered = self.filter is not None and figure not in FILTERED
+        yield unfiltered, f"no filter acts on {self.quantity}: leave `filter` out"
         Quantity("µm", 0.01, 5_000).check(self.largest * _UM_PER[self.unit])
-        return self
 
     def to_domain(self) -> Tolerance:
         """Return the tolerance in micrometres."""
@@ -141,8 +137,6 @@ class SettingsFile(Schema):
     report: ReportSettings = ReportSettings()
     """Head of reports."""
 
-    @model_validator(mode="after")
-    def _profile_of_something(self) -> "SettingsFile":
-        if self.profile is not None and self.instrument is None:
-            raise complaint("a profile needs `instrument` in the same file")
-        return self
+    def _rules(self) -> Rules:
+        alone = self.profile is not None and self.instrument is None
+        yield alone, "a profile needs `instrument` in the same file"

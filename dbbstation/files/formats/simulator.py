@@ -5,16 +5,15 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from dbbstation.errors import Faults, Problem
 from dbbstation.facts.quantities import Text, complaint
 from dbbstation.files.source_text import LARGEST_PROGRAM, text_in, without_faults
-from dbbstation.files.yaml.schema import Schema, read_valid
+from dbbstation.files.yaml.schema import Rules, Schema, read_valid
 
 if TYPE_CHECKING:
     from pathlib import Path
-    from typing import Self
 
     from dbbstation.files.yaml.text import Location, YamlDocument
 
@@ -48,15 +47,11 @@ class ParameterSchema(Schema):
     high: float | None = None
     """Greatest possible value."""
 
-    @model_validator(mode="after")
-    def _inside(self) -> Self:
+    def _rules(self) -> Rules:
         low = -float("inf") if self.low is None else self.low
         high = float("inf") if self.high is None else self.high
-        if not low < high:
-            raise complaint(f"`low` {low} is not below `high` {high}")
-        if not low <= self.value <= high:
-            raise complaint(f"the value {self.value} is outside the bounds {low} to {high}")
-        return self
+        yield not low < high, f"`low` {low} is not below `high` {high}"
+        yield not low <= self.value <= high, f"the value {self.value} is outside the bounds {low} to {high}"
 
 
 class OutputSchema(Schema):
@@ -132,18 +127,14 @@ class SimulatorFile(Schema):
     time_limit_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 60.0
     """Longest time of one simulation [s]; a longer one is refused with its input."""
 
-    @model_validator(mode="after")
-    def _apart(self) -> Self:
-        if sum(one is not None for one in (self.python, self.program, self.fmu)) != 1:
-            raise complaint("one of `python`, `program` and `fmu` is expected")
-        if twice := sorted(set(self.parameters) & set(self.states)):
-            raise complaint(f"`{twice[0]}` is both a parameter and a state")
-        if "t" in self.inputs:
-            raise complaint("the input `t` already means the time; give it another name")
+    def _rules(self) -> Rules:
+        programs = sum(one is not None for one in (self.python, self.program, self.fmu))
+        yield programs != 1, "one of `python`, `program` and `fmu` is expected"
+        for name in sorted(set(self.parameters) & set(self.states)):
+            yield True, f"`{name}` is both a parameter and a state"
+        yield "t" in self.inputs, "the input `t` already means the time; give it another name"
         for name, port in self.ports.items():
-            if "t" in port.signals:
-                raise complaint(f"the signal `t` of port `{name}` already means the time")
-        return self
+            yield "t" in port.signals, f"the signal `t` of port `{name}` already means the time"
 
 
 def parse_simulator(path: Path, faults: list[Problem]) -> SimulatorFile | None:

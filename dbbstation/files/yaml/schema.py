@@ -1,17 +1,25 @@
 """Common base of schemas, strict and frozen; faults become problems with a position."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from inspect import get_annotations
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar, get_type_hints
+from typing import Any, ClassVar, Self, TypeAlias, TypeVar, get_type_hints
 
-from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError, create_model
+from pydantic import (
+    BaseModel,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationError,
+    create_model,
+    model_validator,
+)
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, ErrorDetails
 
 from dbbstation.catalogue import meant
 from dbbstation.errors import MOST_FAULTS, Problem, few
+from dbbstation.facts.quantities import complaint
 from dbbstation.facts.record import STRICT, Record, describe
 from dbbstation.facts.serialise import adapter
 from dbbstation.files.source_text import shortened
@@ -36,12 +44,27 @@ BEFORE_FIRST = "24b5a22b"
 """Commit that reads files from before the first release, in formats with a version of 2 or more."""
 
 
+Rules: TypeAlias = Iterable[tuple[object, str]]
+"""Rules of valid keys together: whether one is broken, and the sentence about it."""
+
+
 class Schema(BaseModel):
     """Base of every part of a file format; the docstring under each field states its unit and sign."""
 
     model_config = STRICT
     replaced: ClassVar["type[Schema] | None"] = None
     """Part of a format whose keys these replace."""
+
+    def _rules(self) -> Rules:
+        """Return the rules in order; only the first broken one is reported."""
+        return ()
+
+    @model_validator(mode="after")
+    def _obeys_rules(self) -> Self:
+        for broken, what in self._rules():
+            if broken:
+                raise complaint(what)
+        return self
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from dbbstation.files.checking import Checked
-    from dbbstation.nc.circle_program import Approach
     from dbbstation.results.checked import CheckedFile, CheckResult, DryRunResult, SampledPlanResult
     from dbbstation.sources.contract import ErrorSource
 
@@ -92,7 +91,6 @@ def check(
         raise click.UsageError("name at least one file or session folder")
 
     from dbbstation.files.own_sources import every_source
-    from dbbstation.nc.circle_program import Approach
 
     known = every_source(source_files)
     results = [_check_one(file, known) for file in files]
@@ -100,7 +98,7 @@ def check(
     machines = _sound(results, "dbb-machine")
     # Of several machines nobody has said which the plans are for.
     runs = [
-        _dry_run(plan, machine, tests, exclude, step_deg, None if bar_stays_on else Approach(clearance_mm))
+        _dry_run(plan, machine, tests, exclude, step_deg, None if bar_stays_on else clearance_mm)
         for plan in _sound(results, "dbb-plan")
         for machine in (machines if len(machines) == 1 else ())
     ]
@@ -222,7 +220,7 @@ def _dry_run(
     tests: Names,
     exclude: Names,
     step_deg: float,
-    approach: Approach | None,
+    clearance_mm: float | None,
 ) -> DryRunResult:
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
@@ -233,7 +231,9 @@ def _dry_run(
     plan, machine = read_plan(plan_file), read_machine(machine_file)
     chosen = chosen_of(plan.name, plan.tests, tests, exclude)
     with count_bar("programs") as trying:
-        count, faults = dry_run(plan, machine, tests=chosen, step_deg=step_deg, approach=approach, progress=trying)
+        count, faults = dry_run(
+            plan, machine, tests=chosen, step_deg=step_deg, clearance_mm=clearance_mm, progress=trying
+        )
     on = f"on {machine_file}: "
     problems = tuple(Problem.of(plan_file, f"{on}{fault.where}: {fault.what}", fault.remedy) for fault in faults)
     return DryRunResult(str(plan_file), str(machine_file), count, not problems, problems)

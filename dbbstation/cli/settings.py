@@ -84,7 +84,7 @@ PROGRAM = "dbbstation"
 def built_in() -> dict[str, str | int | float | None]:
     """Return the program's own values by key, or None; without tolerances."""
     from dbbstation.files.formats.number_language import PLAIN
-    from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH
+    from dbbstation.nc.circle_program import CLEARANCE_MM, STEP_DEG
     from dbbstation.plan.plan import LARGEST_LOSS_PERCENT
     from dbbstation.station.bar_known import USUAL_AGE_H
 
@@ -97,7 +97,7 @@ def built_in() -> dict[str, str | int | float | None]:
         "program.dialect": "linuxcnc",
         "program.step_deg": STEP_DEG,
         "program.chord_um": 1e3 * CHORD_MM,
-        "program.clearance_mm": USUAL_APPROACH.clear_mm,
+        "program.clearance_mm": CLEARANCE_MM,
         "limits.largest_correction_mm": LARGEST_CORRECTION_MM,
         "limits.largest_loss_percent": LARGEST_LOSS_PERCENT,
         "limits.largest_bar_age_h": USUAL_AGE_H,

@@ -71,7 +71,7 @@ def streamed(path: Path, *, force: bool = False) -> Iterator[BinaryIO]:
 @contextlib.contextmanager
 def _replacing(path: Path) -> Iterator[BinaryIO]:
     path = real_path(path)  # a link stays a link, what it leads to is replaced
-    with _told(path):
+    with told_of(path):
         temporary = _temporary(path)
         try:
             with _synced(temporary) as file:
@@ -104,7 +104,7 @@ def write_folder(
     if not own:
         refuse_recorded(folder / "any")
     if not folder.exists():
-        with _told(folder):
+        with told_of(folder):
             _make_parents(folder.parent)
             made = Path(tempfile.mkdtemp(prefix=f".{folder.name}", suffix=_MARK, dir=folder.parent))
             try:
@@ -125,7 +125,7 @@ def write_folder(
         if own and not real_path((folder / name).parent).is_relative_to(real_path(folder)):
             what = "a link in the session leads out of it, and nothing is written there"
             raise OutputError(what, where=str((folder / name).parent), remedy="put the folder itself there, not a link")
-    with _told(folder):
+    with told_of(folder):
         _replace_all(folder, files, read_only)
     for name in files:
         _LOG.info("wrote %s", folder / name)
@@ -267,7 +267,8 @@ def _synced(path: Path) -> Iterator[BinaryIO]:
 
 
 @contextlib.contextmanager
-def _told(path: Path) -> Iterator[None]:
+def told_of(path: Path) -> Iterator[None]:
+    """Turn the system's refusal of a write into an `OutputError`."""
     try:
         yield
     except OSError as error:

@@ -46,22 +46,6 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.trace.recording import Recording
 
-_SCHEMAS = (
-    BarFile,
-    JigFile,
-    JobFile,
-    MachineFile,
-    MappingFile,
-    ModelFile,
-    PlanFile,
-    SessionFile,
-    SettingsFile,
-    SimulatorFile,
-)
-
-SCHEMAS: dict[str, type[Schema | Record]] = {format_of(schema): schema for schema in _SCHEMAS}
-"""Schema of each format, by name with version."""
-
 
 def json_schema(name: str, schema: type[Schema | Record]) -> dict[str, object]:
     """Return the JSON Schema of a format such as `dbb-plan/1`, with units and plausible ranges."""
@@ -149,9 +133,8 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
         checked.kind = str(given)
         _session(checked)
         return
-    if name in _READERS:
+    for _, read, in_words in (one for one in _FORMATS if format_of(one[0]).partition("/")[0] == name):
         checked.kind = str(given)
-        read, in_words = _READERS[name]
         known = (known_sources,) if name == "dbb-model" else ()
         found = read(checked.path, *known, checked.problems)
         checked.summary = "" if found is None else in_words(found)
@@ -181,24 +164,30 @@ def _simulator(found: SimulatorFile) -> str:
     return f"simulator {found.name}: {parameters}, {ports}, {_count(len(found.outputs), 'output')}"
 
 
-_READERS: dict[str, tuple[Callable[..., Any], Callable[[Any], str]]] = {
-    "dbb-machine": (parse_machine, lambda machine: f"machine {machine.name}"),
-    "dbb-plan": (parse_plan, lambda one: f"plan {one.name}: {_count(len(one.tests), 'test')}"),
-    "dbb-jig": (
+_FORMATS: tuple[tuple[type[Schema | Record], Callable[..., Any], Callable[[Any], str]], ...] = (
+    (BarFile, parse_bar, _bar),
+    (
+        JigFile,
         parse_jig,
         lambda one: f"jig with {_count(len(one.jig.bores), 'bore')}, {_count(len(one.balls), 'ball')}",
     ),
-    "dbb-model": (parse_model, _model),
-    "dbb-settings": (
+    (JobFile, parse_job, _job),
+    (MachineFile, parse_machine, lambda machine: f"machine {machine.name}"),
+    (MappingFile, parse_mapping, lambda mapping: f"mapping of {_count(len(mapping.columns), 'column')}"),
+    (ModelFile, parse_model, _model),
+    (PlanFile, parse_plan, lambda one: f"plan {one.name}: {_count(len(one.tests), 'test')}"),
+    (
+        SettingsFile,
         lambda path, _faults: read_settings([path]),
         lambda one: f"settings: {_count(len(one.values) + len(one.tolerances), 'value')}",
     ),
-    "dbb-bar": (parse_bar, _bar),
-    "dbb-job": (parse_job, _job),
-    "dbb-mapping": (parse_mapping, lambda mapping: f"mapping of {_count(len(mapping.columns), 'column')}"),
-    "dbb-simulator": (parse_simulator, _simulator),
-}
-"""How each format is read, with its faults, and told in one line. A model also needs the error sources."""
+    (SimulatorFile, parse_simulator, _simulator),
+)
+"""Schema of each format but sessions, how it is read, with its faults, and told in one line. A model also needs the error
+sources."""
+
+SCHEMAS = {format_of(schema): schema for schema in sorted((SessionFile, *(one for one, *_ in _FORMATS)), key=format_of)}
+"""Schema of each format, by name with version."""
 
 
 def _run(checked: Checked) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -34,18 +33,8 @@ BAR_ON = "put the bar on its balls, start recording, then continue"
 BAR_OFF = "stop recording, take the bar off, then continue"
 
 
-@dataclass(frozen=True)
-class Approach:
-    """Rapids to the first point and from the last one.
-
-    Attributes:
-        clear_mm: height of rapids above these points, clear of ball, holder and bar [mm].
-    """
-
-    clear_mm: float = 20.0
-
-
-USUAL_APPROACH = Approach()
+CLEARANCE_MM = 20.0
+"""Height of rapids above the first and the last point, clear of ball, holder and bar."""
 
 
 def circle_toolpath(
@@ -53,23 +42,23 @@ def circle_toolpath(
     name: str,
     *,
     step_deg: float = STEP_DEG,
-    approach: Approach | None = USUAL_APPROACH,
+    clearance_mm: float | None = CLEARANCE_MM,
 ) -> Toolpath:
     """Return the nominal path of a run as straight moves every `step_deg`.
 
     Args:
-        approach: where rapids end and the program waits for the bar; None: the bar stays on, and the program has only
-            feed moves.
+        clearance_mm: height of the rapids, behind which the program waits for the bar; None: the bar stays on, and the
+            program has only feed moves.
     """
     ends_deg = circle.theta_deg(np.array([-circle.overshoot_deg, FULL_TURN_DEG + circle.overshoot_deg]))
     first, last = circle.poses(ends_deg, circle.feed_in_mm)
     path = ToolpathBuilder(name)
     path.corner_mm = max(LEAST_CORNER_MM, chord_error_mm(circle, step_deg))
     path.holds = {IN_FORCE: (0.0,) * 6}
-    if approach is not None:
-        path.rapid(_raised(first, approach.clear_mm))
+    if clearance_mm is not None:
+        path.rapid(_raised(first, clearance_mm))
     path.feed(first[None], circle.feed_mm_min)
-    if approach is not None:
+    if clearance_mm is not None:
         path.say(RowKind.PAUSE, BAR_ON)
     path.dwell(OUTER_DWELL_S)
     theta_deg = circle.theta_deg(arc_phi_deg(circle, step_deg))
@@ -85,9 +74,9 @@ def circle_toolpath(
     path.dwell(CORNER_DWELL_S)
     path.feed(last[None], circle.feed_mm_min)
     path.dwell(OUTER_DWELL_S)
-    if approach is not None:
+    if clearance_mm is not None:
         path.say(RowKind.PAUSE, BAR_OFF)
-        path.rapid(_raised(last, approach.clear_mm))
+        path.rapid(_raised(last, clearance_mm))
     return path.built()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.machine.geometry import check_model_is_of
-from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
+from dbbstation.nc.circle_program import CLEARANCE_MM, STEP_DEG, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.curve import rounding_mm
 from dbbstation.nc.export import named, planner_of, written_program
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from dbbstation.machine.geometry import Machine
-    from dbbstation.nc.circle_program import Approach
     from dbbstation.nc.dialect import Dialect
     from dbbstation.nc.export import Inverse, Program
     from dbbstation.nc.planner import Planner
@@ -38,7 +37,7 @@ def circle_programs(
     tests: Sequence[str] = (),
     step_deg: float = STEP_DEG,
     chord_mm: float = CIRCLE_CHORD_MM,
-    approach: Approach | None = USUAL_APPROACH,
+    clearance_mm: float | None = CLEARANCE_MM,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> list[Program]:
     """Return the programs of all runs, named TEST-DIRECTION with the dialect's extension.
@@ -64,7 +63,7 @@ def circle_programs(
         step = step_deg
         if inverse is not None and inverse.prefer is Prefer.ACCURACY:
             step = _step_deg(circle, step_deg, chord_mm, planner_of(machine, dialect))
-        path = replace(circle_toolpath(circle, title, step_deg=step, approach=approach), run=number)
+        path = replace(circle_toolpath(circle, title, step_deg=step, clearance_mm=clearance_mm), run=number)
         rounding_um = 1e3 * rounding_mm(dialect.decimals)
         header = _circle_header(title, circle, step, {"plan": plan.name, "machine": machine.name}, rounding_um)
         header += named(origin or {})
@@ -81,7 +80,7 @@ def dry_run(
     *,
     tests: Sequence[str] = (),
     step_deg: float = STEP_DEG,
-    approach: Approach | None = USUAL_APPROACH,
+    clearance_mm: float | None = CLEARANCE_MM,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> tuple[int, list[StationError]]:
     """Check the nominal programs of all runs of a plan without writing them."""
@@ -89,7 +88,7 @@ def dry_run(
     faults: list[StationError] = []
     for done, ((name, direction), circle) in enumerate(runs.items()):
         progress(done, len(runs))
-        path = circle_toolpath(circle, f"test {name} {direction}", step_deg=step_deg, approach=approach)
+        path = circle_toolpath(circle, f"test {name} {direction}", step_deg=step_deg, clearance_mm=clearance_mm)
         for check in (check_reach, check_feeds):
             try:
                 check(machine, path)

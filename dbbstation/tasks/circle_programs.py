@@ -84,7 +84,6 @@ def program(
     from dbbstation.files.own_dialects import dialect_given
     from dbbstation.files.provenance import from_python
     from dbbstation.machine.geometry import refuse_second_correction
-    from dbbstation.nc.circle_program import Approach
     from dbbstation.nc.circle_programs import circle_programs
     from dbbstation.plan.plan import chosen_of
     from dbbstation.results.model_warnings import model_warnings
@@ -119,7 +118,7 @@ def program(
         tests=chosen_of(tests_of.name, tests_of.tests, tests, exclude),
         step_deg=step_deg,
         chord_mm=chord_um / 1e3,
-        approach=None if bar_stays_on else Approach(clearance_mm),
+        clearance_mm=None if bar_stays_on else clearance_mm,
         progress=telling.counted("programs"),
     )
     write_folder(folder, {each.file: each.text for each in programs}, force=force)

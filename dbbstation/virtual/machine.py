@@ -37,7 +37,7 @@ class CommandedPath:
 
 def circle_path(circle: Circle) -> CommandedPath:
     """Return a run's path with dwells and corners."""
-    return path_of(circle_toolpath(circle, "circle", approach=None))
+    return path_of(circle_toolpath(circle, "circle", clearance_mm=None))
 
 
 def path_of(toolpath: Toolpath) -> CommandedPath:

@@ -290,19 +290,16 @@ class VirtualInstrument:
 
     def _obey(self, command: bytes, now_s: float) -> None:
         ask, timing = self.protocol.ask, self.protocol.timing
-        for step in ask.stop:
-            if step.send == command:
-                self._running = self._running and bool(ask.start) and ask.start[-1].send == command
-                self._send(step.reply, now_s + timing.reply_latency_s)
-                return
-        for step in ask.start:
-            if step.send == command:
-                self._send(step.reply, now_s + timing.reply_latency_s)
-                if step is ask.start[-1]:
-                    self._running = True
-                    self._next_sample_s = now_s
-                return
         replied_s = now_s + timing.reply_latency_s
+        for step in (*ask.stop, *ask.start):
+            if step.send == command:
+                self._send(step.reply, replied_s)
+                begins = bool(ask.start) and ask.start[-1].send == command
+                if step in ask.stop:
+                    self._running &= begins
+                elif begins:
+                    self._running, self._next_sample_s = True, now_s
+                return
         if ask.follow_up is not None and ask.follow_up.request == command:
             # What explains a fault comes first, that there is none to explain last.
             frame = ask.follow_up.frames[0 if self._fault else -1]

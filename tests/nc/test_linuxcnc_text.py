@@ -65,7 +65,7 @@ def test_a_small_circle_reads_as_worked_out_by_hand(linuxcnc):
 
 
 def test_with_the_bar_on_there_are_no_rapids_and_no_stops(linuxcnc):
-    lines = linuxcnc.write(circle_toolpath(SMALL, "small", step_deg=90.0, approach=None)).splitlines()
+    lines = linuxcnc.write(circle_toolpath(SMALL, "small", step_deg=90.0, clearance_mm=None)).splitlines()
     lines = lines[lines.index("G21 G90 G94 G17 G40 G49") :]
     assert lines[2] == "G1 X10.000000 Y-82.000000 Z-1100.000000 A5.0000000 B-2.5000000 C0.0000000 F600"
     assert lines[3] == "G4 P1"

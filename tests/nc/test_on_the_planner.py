@@ -157,7 +157,7 @@ def circle_programs_of(
     machine = replace(crooked.machine, acceleration_mm_s2=mm_s2)
     inverse = Inverse(MachineModel(machine, crooked.sources), prefer=prefer)
     nominal, compensated = (
-        circle_programs(plan, machine, linuxcnc, inverse=each, approach=None, chord_mm=1e-3, tests=["a"])[0]
+        circle_programs(plan, machine, linuxcnc, inverse=each, clearance_mm=None, chord_mm=1e-3, tests=["a"])[0]
         for each in (None, inverse)
     )
     return nominal.text, compensated

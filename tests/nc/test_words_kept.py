@@ -160,7 +160,7 @@ OFFSETS = {
 @pytest.mark.parametrize("model", [None, "crooked"])
 def test_a_ball_bar_program_stops_where_an_offset_is_not_zero(linuxcnc, table2, crooked, tmp_path, which, model):
     inverse = None if model is None else Inverse(crooked)
-    (program, _) = circle_programs(table2, crooked.machine, linuxcnc, inverse=inverse, tests=["a"], approach=None)
+    (program, _) = circle_programs(table2, crooked.machine, linuxcnc, inverse=inverse, tests=["a"], clearance_mm=None)
     parameters, message = OFFSETS[which]
     made = printed(program.text, tmp_path, parameters)
     names = [name for name, _ in made]
@@ -177,7 +177,7 @@ def test_a_ball_bar_program_stops_where_an_offset_is_not_zero(linuxcnc, table2, 
 @needs_rs274
 @pytest.mark.parametrize(("before", "stops"), [("G43.1 Z1", True), ("G43.1 Z1\nG49", False), ("T1 M6", False)])
 def test_a_ball_bar_program_stops_where_a_tool_length_is_in_force(linuxcnc, table2, tmp_path, before, stops):
-    text = linuxcnc.write(circle_toolpath(table2.tests["a"].circle, "a", step_deg=5.0, approach=None))
+    text = linuxcnc.write(circle_toolpath(table2.tests["a"].circle, "a", step_deg=5.0, clearance_mm=None))
     made = printed(f"{before}\n{text}", tmp_path)
     assert any(name == "STRAIGHT_FEED" for name, _ in made) is not stops
     assert any(name == "MESSAGE" and "tool length" in said for name, said in made) is stops

@@ -112,7 +112,7 @@ def test_a_run_that_the_plan_does_not_have_is_refused(reference: Machine, plan: 
 
 def test_of_a_program_the_part_between_its_pauses_is_run(plan: Plan) -> None:
     circle = plan.tests["a"].circle
-    with_approach, without = circle_toolpath(circle, "a"), circle_toolpath(circle, "a", approach=None)
+    with_approach, without = circle_toolpath(circle, "a"), circle_toolpath(circle, "a", clearance_mm=None)
     path, bare = path_of(with_approach), path_of(without)
     assert path.duration_s == pytest.approx(bare.duration_s, abs=1e-6)
     at = np.linspace(0.0, bare.duration_s, 500)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, NoReturn, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from dbbstation.errors import InputError
 
@@ -27,10 +27,8 @@ def parameters_of(text: str, file: str) -> dict[int, float]:
         match = _PARAMETER.fullmatch(line)
         return None if match is None else (int(match[1]), float(match[2]))
 
-    said = "a parameter file", "a number and its value"
-    return _entries(text.splitlines(), file, entry, said) or _refuse(
-        file, "parameter", "parameter file, such as linuxcnc.var"
-    )
+    said = "parameter", "parameter file", "a number and its value", "linuxcnc.var"
+    return _entries(text.splitlines(), file, entry, said)
 
 
 def tools_of(text: str, file: str) -> dict[int, dict[str, float]]:
@@ -45,23 +43,20 @@ def tools_of(text: str, file: str) -> dict[int, dict[str, float]]:
         return None if "T" not in words or _TOOL_WORD.sub("", line).strip() else (int(words["T"]), words)
 
     lines = [line.partition(";")[0].upper() for line in text.splitlines()]
-    said = "a tool table", "T and words such as Z52.1"
-    return _entries(lines, file, entry, said) or _refuse(file, "tool", "tool table, such as tool.tbl")
+    return _entries(lines, file, entry, ("tool", "tool table", "T and words such as Z52.1", "tool.tbl"))
 
 
 def _entries(
-    lines: Sequence[str], file: str, entry: Callable[[str], tuple[int, Value] | None], said: tuple[str, str]
+    lines: Sequence[str], file: str, entry: Callable[[str], tuple[int, Value] | None], said: tuple[str, str, str, str]
 ) -> dict[int, Value]:
     found: dict[int, Value] = {}
+    thing, kind, content, example = said
     for number, line in enumerate(lines, 1):
         if line.strip():
             one = entry(line)
             if one is None:
-                what, remedy = f"this is not a line of {said[0]}", f"a line needs {said[1]}"
-                raise InputError.of(file, what, remedy, number, 1)
+                raise InputError.of(file, f"this is not a line of a {kind}", f"a line needs {content}", number, 1)
             found[one[0]] = one[1]
+    if not found:
+        raise InputError.of(file, f"no {thing} in it", f"name LinuxCNC's {kind}, such as {example}")
     return found
-
-
-def _refuse(file: str, what: str, kind: str) -> NoReturn:
-    raise InputError.of(file, f"no {what} in it", f"name LinuxCNC's {kind}")

@@ -264,21 +264,9 @@ _NAMES = {
     "bore": {"bore", "bohrung"},
 }
 _MEASURED = {"actual", "act", "ist", "istwert", "meas", "measured", "gemessen", "実測値", "測定値"}
-_NOT_MEASURED = {
-    "nominal",
-    "nom",
-    "soll",
-    "sollwert",
-    "target",
-    "基準値",
-    "設計値",
-    "u",
-    "dev",
-    "deviation",
-    "abweichung",
-    "tol",
-    "tolerance",
-}
+_NOT_MEASURED = set(
+    "nominal nom soll sollwert target 基準値 設計値 u dev deviation abweichung tol tolerance".split()  # noqa: SIM905 - words
+)
 """Words that, beside an axis, mark a column as no measured coordinate. Programs use `U` and `u` differently, so the user must name uncertainty columns."""
 
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.errors import OutputError, Problem, unwritable
-from dbbstation.files.atomic import write_bytes
+from dbbstation.files.atomic import told_of, write_bytes
 from dbbstation.files.gateway import content_of, sha256_hex
 from dbbstation.files.places import RUNS
 from dbbstation.files.source_text import read_bytes
@@ -210,11 +210,9 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
 def _parted(log: EventLog, handle: int) -> int:
     """Replace the log by a copy if its file has hard links, so that a linked backup stays unchanged."""
     os.close(handle)  # Windows replaces no file that is open
-    try:
+    with told_of(log.path):
         write_bytes(log.path, content_of(log.path), force=True, rewrites=True)
         return open_to_change(log.path)
-    except OSError as error:
-        raise unwritable(error, log.path) from error
 
 
 def set_back(log: EventLog) -> list[str]:

@@ -12,6 +12,7 @@ import time
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import OutputError, unwritable
+from dbbstation.files.atomic import told_of
 from dbbstation.system.handles import Closing, lock, open_to_change, read_at, write_at
 
 if TYPE_CHECKING:
@@ -62,10 +63,8 @@ class SessionLock(Closing):
 
     def _open(self, folder: Path) -> None:
         path = folder / LOCK_FILE
-        try:
+        with told_of(path):
             self._file = open_to_change(path, create=True)
-        except OSError as error:
-            raise unwritable(error, path) from error
 
     def _in_place(self, folder: Path) -> bool:
         if self._file is None:

@@ -121,7 +121,7 @@ def sealing(folder: Path) -> Sealing:
 
 def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
     faults = Faults(path)
-    additions: list[tuple[int, str]] = []
+    additions: list[tuple[MappingNode, str, str]] = []
     named = []
     for run in _runs(text, path):
         file, state = _entry(run, "file"), _entry(run, "state")
@@ -133,7 +133,7 @@ def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
             place = (file.start_mark.line + 1, file.start_mark.column + 1)
             faults.add(f"the run file {file.value} is missing", "put it there or leave the run out", *place)
             continue
-        additions.append(_behind(run, "file", f"sha256: {digest_of(recorded)}", text))
+        additions.append((run, "file", f"sha256: {digest_of(recorded)}"))
         named.append(file.value)
     refuse(faults)
     return _added(text, additions), tuple(named)
@@ -169,13 +169,10 @@ def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal, EventLog 
 
 
 def _with_links(text: str, path: Path, runs: Sequence[RunEntry]) -> tuple[str, tuple[str, ...]]:
-    additions = []
-    named = []
-    for node, run in zip(_runs(text, path), runs, strict=True):
-        if run.chain_sha256 and _entry(node, "chain_sha256") is None:
-            additions.append(_behind(node, "sha256", f"chain_sha256: {run.chain_sha256}", text))
-            named.append(run.name)
-    return _added(text, additions), tuple(named)
+    pairs = zip(_runs(text, path), runs, strict=True)
+    new = [(node, run) for node, run in pairs if run.chain_sha256 and _entry(node, "chain_sha256") is None]
+    lines = [(node, "sha256", f"chain_sha256: {run.chain_sha256}") for node, run in new]
+    return _added(text, lines), tuple(run.name for _, run in new)
 
 
 def _with_seal(text: str, seal: Seal) -> str:
@@ -210,8 +207,8 @@ def _behind(run: MappingNode, key: str, addition: str, text: str) -> tuple[int, 
     return len(text) if newline < 0 else newline, f"\n{' ' * name.start_mark.column}{addition}"
 
 
-def _added(text: str, additions: Sequence[tuple[int, str]]) -> str:
-    for at, addition in sorted(additions, reverse=True):
+def _added(text: str, additions: Sequence[tuple[MappingNode, str, str]]) -> str:
+    for at, addition in sorted((_behind(*one, text) for one in additions), reverse=True):
         text = text[:at] + addition + text[at:]
     return text
 

@@ -166,12 +166,11 @@ class WordDialect(Dialect):
 
     def corner(self, corner_mm: float) -> str:
         """Return the words for the rounding of all following corners [mm]: 0 exact, infinite unlimited."""
-        lacking = "how far corners may be rounded"
         if corner_mm <= 0.0:
-            return self._from_table("exact" if corner_mm == 0.0 else "exact stop", lacking)
-        if math.isinf(corner_mm):
-            return self._from_table("continuous", lacking)
-        return self._from_table("within", lacking, mm=digits(corner_mm))
+            what, text = "exact" if corner_mm == 0.0 else "exact stop", ""
+        else:
+            what, text = ("continuous", "") if math.isinf(corner_mm) else ("within", digits(corner_mm))
+        return self._from_table(what, "how far corners may be rounded", mm=text)
 
     def dwell(self, seconds: float) -> str:
         """Return a timed stop [s]."""

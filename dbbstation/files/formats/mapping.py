@@ -27,10 +27,6 @@ INCH_MM = 25.4
 """One inch [mm], exactly [ISO 31-1]."""
 
 _LENGTHS = {"mm": 1.0, "µm": 1e-3, "m": 1e3, "inch": INCH_MM, "mil": 1e-3 * INCH_MM, "µinch": 1e-6 * INCH_MM}
-_ANGLES = {"deg": 1.0, "rad": math.degrees(1.0), "turn": 360.0}
-_TIMES = {"s": 1.0, "ms": 1e-3, "min": 60.0}
-_CURRENTS = {"A": 1.0, "mA": 1e-3}
-_TEMPERATURES = {"degC": 1.0, "degF": 5.0 / 9.0, "K": 1.0}
 _OFFSETS = {"degF": -160.0 / 9.0, "K": -273.15}
 
 TIME, ANGLE, LENGTH, DEVIATION = "time", "angle", "length", "deviation"
@@ -41,11 +37,14 @@ IGNORED = "ignored"
 OF_RUNS = (TEST, DIRECTION, REPEAT, MOUNTING, STATE, STARTED, RUN)
 """Meanings of columns that identify a row's run; their cells are equal in all rows of the run."""
 
-_OF_KIND = {ColumnKind.TEMPERATURE: _TEMPERATURES, ColumnKind.CURRENT: _CURRENTS}
+_OF_KIND = {
+    ColumnKind.TEMPERATURE: {"degC": 1.0, "degF": 5.0 / 9.0, "K": 1.0},
+    ColumnKind.CURRENT: {"A": 1.0, "mA": 1e-3},
+}
 
 UNITS: dict[str, dict[str, float]] = {
-    TIME: _TIMES,
-    ANGLE: _ANGLES,
+    TIME: {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    ANGLE: {"deg": 1.0, "rad": math.degrees(1.0), "turn": 360.0},
     LENGTH: _LENGTHS,
     DEVIATION: _LENGTHS,
     **{name: _OF_KIND[column.kind] for name, column in columns.COLUMNS.items() if column.kind in _OF_KIND},

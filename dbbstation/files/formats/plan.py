@@ -39,13 +39,7 @@ def _once(directions: tuple[str, ...]) -> tuple[str, ...]:
     return directions
 
 
-_Feed = Annotated[float, Quantity("mm/min", 20, 100_000)]
-_Start = Annotated[float, Quantity("deg", 0, 720, signed=True)]
-_Overshoot = Annotated[float, Quantity("deg", 1, 360, or_zero=True)]
-_FeedIn = Annotated[float, Quantity("mm", 0.01, 50, or_zero=True)]
-_Directions = Annotated[tuple[Literal["ccw", "cw"], ...], Field(min_length=1), AfterValidator(_once)]
 _Tilt = Annotated[float, Quantity("deg", 0, 180, signed=True)]
-_Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 
 
 class PathSchema(Schema):
@@ -53,15 +47,15 @@ class PathSchema(Schema):
 
     radius_mm: BarMm
     """Length of the bar R, distance between the ball centres [mm]."""
-    feed_mm_min: _Feed
+    feed_mm_min: Annotated[float, Quantity("mm/min", 20, 100_000)]
     """Speed of the tool tip along its path [mm/min]."""
-    start_deg: _Start = 0.0
+    start_deg: Annotated[float, Quantity("deg", 0, 720, signed=True)] = 0.0
     """Angle where the full turn starts, from +X towards +Y positive [deg]."""
-    overshoot_deg: _Overshoot = 0.0
+    overshoot_deg: Annotated[float, Quantity("deg", 1, 360, or_zero=True)] = 0.0
     """Arc travelled before and after the full turn [deg]."""
-    feed_in_mm: _FeedIn = 0.0
+    feed_in_mm: Annotated[float, Quantity("mm", 0.01, 50, or_zero=True)] = 0.0
     """Distance of the feed-in's start outside the circle, along the bar [mm]."""
-    directions: _Directions = ("ccw", "cw")
+    directions: Annotated[tuple[Literal["ccw", "cw"], ...], Field(min_length=1), AfterValidator(_once)] = ("ccw", "cw")
     """Senses of travel in the order they are run."""
 
 
@@ -70,7 +64,7 @@ class TestSchema(Schema):
 
     __test__ = False  # pytest takes the name for one of its own
 
-    name: _Name
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
     """Unique in the plan; part of file names."""
     ball: str
     """Ball that the bar turns about."""

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import MOST_FAULTS, Faults, InputError, Problem, refuse
+from dbbstation.errors import Faults, InputError, Problem, refuse
 from dbbstation.files.formats.number_language import PLAIN
+from dbbstation.files.recordings.run_csv import Counted, check_numbers
 from dbbstation.files.recordings.table_csv import given_table, missing_column, parse_table
 from dbbstation.files.source_text import LARGEST_TABLE, first_line, numbered_lines, text_of
 from dbbstation.trace.drive import DriveRecording
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
 TIME, POSITION, FORCE, CURRENT = "t_s", "position_mm", "force_n", "motor_current_a"
 REQUIRED = (TIME, POSITION)
 
-LARGEST = {TIME: 1e6, POSITION: 1e5, FORCE: 1e7, CURRENT: 1e4}
-"""Greatest plausible size of each column, in its unit."""
+LARGEST = {TIME: (1e6, "s"), POSITION: (1e5, "mm"), FORCE: (1e7, "N"), CURRENT: (1e4, "A")}
+"""Greatest plausible size of each column, and its unit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +110,7 @@ def parse_drive(text: str, file: str) -> DriveFile:
 
 def _checked(table: TableFile, warnings: Faults) -> DriveFile:
     file, header, names = table.file, table.header, list(table.names)
-    faults = Faults(file)
+    faults = Counted(file)
     faults += [missing_column(name, names, file, header) for name in REQUIRED if name not in names]
     if FORCE not in names and CURRENT not in names:
         faults.add(f"neither `{FORCE}` nor `{CURRENT}` is there", f"columns here: {', '.join(names)}", header)
@@ -117,24 +118,12 @@ def _checked(table: TableFile, warnings: Faults) -> DriveFile:
     for name in numbers:
         faults += table.not_finite(name, "correct or remove the line")
     if not faults:
-        _check_values(numbers, table.lines.tolist(), faults)
-    refuse(faults[:MOST_FAULTS])
+        check_numbers(numbers, LARGEST, table.lines.tolist(), faults)
+    refuse(faults.told())
     for name in names:
         if name not in LARGEST:
             warnings.add(f"the column `{name}` is not known; it is kept and not used", line=header)
     return DriveFile(file, header, numbers, tuple(warnings))
-
-
-def _check_values(numbers: dict[str, Floats], lines: list[int], faults: Faults) -> None:
-    t = numbers[TIME]
-    for index in np.flatnonzero(np.diff(t) <= 0.0)[:MOST_FAULTS] + 1:
-        how = "runs backwards" if t[index] < t[index - 1] else "stands still"
-        what = f"time {how} here: t_s {t[index]:g} after {t[index - 1]:g}"
-        faults.add(what, "the file was reordered, or two recordings were joined", lines[index])
-    for name, values in numbers.items():
-        for index in np.flatnonzero(np.abs(values) > LARGEST[name])[:1]:
-            what = f"{name} is {values[index]:g}, sizes up to {LARGEST[name]:g} are plausible"
-            faults.add(what, "check the unit at the end of the column's name", lines[index])
 
 
 def compared_csv(columns: Mapping[str, Floats]) -> str:

@@ -252,17 +252,10 @@ def _comments(lines: list[str]) -> dict[str, tuple[int, str]]:
     return found
 
 
+_AS_CSV = "save the sheet as CSV and name that"
 _BEGINNINGS = (
-    (
-        b"PK\x03\x04",
-        "this is an archive, as Excel and LibreOffice write their workbooks",
-        "save the sheet as CSV and name that",
-    ),
-    (
-        b"\xd0\xcf\x11\xe0",
-        "this is an old Excel workbook or another file of several parts",
-        "save the sheet as CSV and name that",
-    ),
+    (b"PK\x03\x04", "this is an archive, as Excel and LibreOffice write their workbooks", _AS_CSV),
+    (b"\xd0\xcf\x11\xe0", "this is an old Excel workbook or another file of several parts", _AS_CSV),
     (b"%PDF", "this is a PDF", "export the numbers as text from the program that made it"),
     (b"\x1f\x8b", "this file is compressed", "unpack it first"),
 )

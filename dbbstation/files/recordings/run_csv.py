@@ -89,8 +89,8 @@ class Numbers:
         numbers = (
             last.numbers if len(last.numbers) == count else range(last.header_line + 1, last.header_line + 1 + count)
         )
-        _check_time(joined[columns.TIME], numbers, self.faults)
-        _check_sizes(joined, numbers, self.faults)
+        limits = {name: (columns.COLUMNS[name].size, columns.COLUMNS[name].unit) for name in joined}
+        check_numbers(joined, limits, numbers, self.faults)
         return joined
 
 
@@ -118,19 +118,26 @@ def _check_lines(lines: Lines, faults: Counted) -> None:
         faults.add("NumPy reads this file otherwise than line by line", "write plain decimal numbers")
 
 
-def _check_time(t_s: Floats, numbers: Sequence[int], faults: Faults) -> None:
+def check_numbers(
+    found: Mapping[str, Floats], limits: Mapping[str, tuple[float, str]], lines: Sequence[int], faults: Faults
+) -> None:
+    """Check that the time rises, and that no number is too large.
+
+    Args:
+        found: columns by name, each of shape (n,).
+        limits: greatest plausible size of each column, and its unit.
+        lines: of the rows.
+    """
+    t_s = found[columns.TIME]
     for index in (np.flatnonzero(t_s[1:] <= t_s[:-1]) + 1).tolist():
-        what = "runs backwards" if t_s[index] < t_s[index - 1] else "stands still"
-        what = f"time {what} here: t_s {t_s[index]:g} after {t_s[index - 1]:g}"
-        faults.add(what, "the file was reordered, or the clock was set while recording", numbers[index])
-
-
-def _check_sizes(found: dict[str, Floats], numbers: Sequence[int], faults: Faults) -> None:
+        how = "runs backwards" if t_s[index] < t_s[index - 1] else "stands still"
+        what = f"time {how} here: t_s {t_s[index]:g} after {t_s[index - 1]:g}"
+        faults.add(what, "the file was reordered, recordings were joined, or the clock was set", lines[index])
     for name, values in found.items():
-        column = columns.COLUMNS[name]
-        for index in np.flatnonzero((values > column.size) | (values < -column.size))[:1].tolist():
-            what = f"{name} is {values[index]:g}, sizes up to {column.size:g} {column.unit} are plausible"
-            faults.add(what, f"check the unit, {column.unit} is needed", numbers[index])
+        size, unit = limits[name]
+        for index in np.flatnonzero((values > size) | (values < -size))[:1].tolist():
+            what = f"{name} is {values[index]:g}, sizes up to {size:g} {unit} are plausible"
+            faults.add(what, f"check the unit, {unit} is needed", lines[index])
 
 
 @dataclass(frozen=True, eq=False)

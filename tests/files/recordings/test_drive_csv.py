@@ -58,7 +58,7 @@ def test_a_last_line_that_was_cut_off_costs_that_line_alone():
         (f"{HEADER}\n0,1,2\n0.001,1,two\n", "x.csv:3: force_n is `two`, not a finite number"),
         (f"{HEADER}\n0,1,2\n0.002,1,2\n0.001,1,2\n", "x.csv:4: time runs backwards here: t_s 0.001 after 0.002"),
         (f"{HEADER}\n0,1,2\n0,1,2\n", "x.csv:3: time stands still here"),
-        (f"{HEADER}\n0,1,2\n1,1e9,2\n", "x.csv:3: position_mm is 1e+09, sizes up to 100000 are plausible"),
+        (f"{HEADER}\n0,1,2\n1,1e9,2\n", "x.csv:3: position_mm is 1e+09, sizes up to 100000 mm are plausible"),
     ],
 )
 def test_faults_are_named_with_their_line(text, said):

@@ -1,7 +1,7 @@
 """Numbers with units for schemas; a plausible range detects a wrong unit."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -35,6 +35,17 @@ def complaint(what: str, kind: str = "wrong") -> PydanticCustomError:
         kind: `implausible` if its unit may be wrong.
     """
     return PydanticCustomError(kind, "{what}", {"what": what})
+
+
+def sound(fault: Callable[[Any], str]) -> AfterValidator:
+    """Return a check of a value in a file, from a function that returns what is wrong with it, or an empty text."""
+
+    def checked(value: object) -> object:
+        if what := fault(value):
+            raise complaint(what)
+        return value
+
+    return AfterValidator(checked)
 
 
 @dataclass(frozen=True)

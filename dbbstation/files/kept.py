@@ -34,23 +34,14 @@ SHARES = frozenset(
 """Network file systems, on which SQLite's locks are unreliable."""
 
 
-@dataclass(frozen=True)
-class Stamp:
-    """Evidence that a file is unchanged, without reading it."""
-
-    modified_ns: int
-    size: int
-
-
-def stamp_of(path: Path, *others: Path) -> Stamp:
-    """Return the stamp of one or several files: names, times and sizes.
+def stamp_of(path: Path, *others: Path) -> str:
+    """Return evidence that one or several files are unchanged, from their names, times and sizes, without reading them.
 
     Raises:
         OSError: one is missing.
     """
     stats = [(str(one), one.stat()) for one in (path, *others)]
-    all_of_it = repr([(name, one.st_mtime_ns, one.st_size) for name, one in stats])
-    return Stamp(int(sha256_hex(all_of_it)[:15], 16), sum(one.st_size for _, one in stats))
+    return sha256_hex(repr([(name, one.st_mtime_ns, one.st_size) for name, one in stats]))
 
 
 @dataclass(frozen=True)
@@ -59,13 +50,6 @@ class NotedAnchor:
 
     anchor: str
     at: str
-
-
-@dataclass(frozen=True)
-class _Row:
-    stamp: Stamp
-    sha256: str
-    text: str
 
 
 class CacheFile(Closing):
@@ -142,28 +126,27 @@ class Kept(CacheFile):
     """
 
     def __init__(self, folder: Path, *, begin_anew: bool = False) -> None:
-        self._rows: dict[str, _Row] = {}
+        self._rows: dict[str, tuple[str, str]] = {}
         self._noted: dict[str, NotedAnchor] = {}
         self._by_hash: dict[str, str] = {}
         self._begin_anew = begin_anew
         file = index_file(folder)
         super().__init__(file, _unfit(file, folder))
 
-    def of(self, name: str, stamp: Stamp) -> str | None:
+    def of(self, name: str, stamp: str) -> str | None:
         """Return the stored result of an unchanged file, or None."""
-        row = self._rows.get(name)
-        return row.text if row is not None and row.stamp == stamp else None
+        known, text = self._rows.get(name, ("", ""))
+        return text if known == stamp else None
 
     def of_content(self, sha256: str) -> str | None:
         """Return the stored result of a file with this content, or None."""
         return self._by_hash.get(sha256)
 
-    def keep(self, name: str, stamp: Stamp, sha256: str, text: str) -> None:
+    def keep(self, name: str, stamp: str, sha256: str, text: str) -> None:
         """Store a file's result."""
-        self._rows[name] = _Row(stamp, sha256, text)
+        self._rows[name] = stamp, text
         self._by_hash[sha256] = text
-        row = (name, stamp.modified_ns, stamp.size, sha256, text)
-        self._write("INSERT OR REPLACE INTO kept VALUES (?, ?, ?, ?, ?)", [row])
+        self._write("INSERT OR REPLACE INTO kept VALUES (?, ?, ?, ?)", [(name, stamp, sha256, text)])
 
     def drop_others(self, names: Iterable[str]) -> None:
         """Delete the results of missing files."""
@@ -191,16 +174,12 @@ class Kept(CacheFile):
             base.execute("DROP TABLE IF EXISTS kept")
             base.execute("DELETE FROM version")
             base.execute("INSERT INTO version VALUES (?)", (program,))
-        base.execute(
-            "CREATE TABLE IF NOT EXISTS kept (name TEXT PRIMARY KEY, modified_ns INTEGER, size INTEGER, sha256 TEXT, text TEXT)"
-        )
+        base.execute("CREATE TABLE IF NOT EXISTS kept (name TEXT PRIMARY KEY, stamp TEXT, sha256 TEXT, text TEXT)")
         base.execute("CREATE TABLE IF NOT EXISTS noted (name TEXT PRIMARY KEY, anchor TEXT, at TEXT)")
         base.execute("COMMIT")
-        rows = base.execute("SELECT name, modified_ns, size, sha256, text FROM kept").fetchall()
-        self._rows = {
-            str(n): _Row(Stamp(int(at), int(size)), str(digest), str(text)) for n, at, size, digest, text in rows
-        }
-        self._by_hash = {row.sha256: row.text for row in self._rows.values()}
+        for name, stamp, digest, text in base.execute("SELECT name, stamp, sha256, text FROM kept"):
+            self._rows[str(name)] = str(stamp), str(text)
+            self._by_hash[str(digest)] = str(text)
         noted = base.execute("SELECT name, anchor, at FROM noted").fetchall()
         self._noted = {str(name): NotedAnchor(str(anchor), str(at)) for name, anchor, at in noted}
 

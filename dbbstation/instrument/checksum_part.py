@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from pydantic import Field
 
 from dbbstation.files.yaml.schema import Schema
-from dbbstation.instrument.fields import NotUnderstood
+from dbbstation.instrument.fields import DIGIT, NotUnderstood, spelled
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -80,16 +80,12 @@ class Checksum(Schema):
         return _KNOWN[self.algorithm][0] * (1 if self.written == "binary" else 2)
 
     def pattern(self) -> bytes:
-        digit = {"binary": b"[\\x00-\\xff]", "hex": b"[0-9a-f]", "HEX": b"[0-9A-F]"}[self.written]
-        return digit + b"{%d}" % self.width
+        return DIGIT.get(self.written, b"[\\x00-\\xff]") + b"{%d}" % self.width
 
     def over(self, before: bytes) -> bytes:
         """Return the bytes of the checksum over the preceding bytes."""
         raw = checksum(self.algorithm, before[self.after :]).to_bytes(_KNOWN[self.algorithm][0], self.order)
-        if self.written == "binary":
-            return raw
-        text = raw.hex().encode()
-        return text.upper() if self.written == "HEX" else text
+        return spelled(raw, self.written)
 
     def verify(self, before: bytes, raw: bytes) -> None:
         """Check a frame's checksum.

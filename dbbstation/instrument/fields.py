@@ -241,6 +241,15 @@ class SkipField(Schema):
         return self.written
 
 
+DIGIT = {"hex": b"[0-9a-f]", "HEX": b"[0-9A-F]"}
+"""Pattern of a digit of hexadecimal text."""
+
+
+def spelled(raw: bytes, written: str) -> bytes:
+    """Return bytes as they are, or as hexadecimal text in small letters or capitals."""
+    return {"hex": raw.hex(), "HEX": raw.hex().upper()}[written].encode() if written in DIGIT else raw
+
+
 _PRINTABLE = b"[\\x20-\\x7e]"
 
 

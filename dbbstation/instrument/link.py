@@ -187,7 +187,8 @@ def open_link(
         opened.open()
     except _OPENING_ERRORS as error:
         _close_quietly(opened)
-        raise _not_opened(port, speed, error) from None
+        what, remedy = _why_not_opened(port, speed, error)
+        raise InstrumentError(what, where=port, remedy=remedy) from None
     descriptor = getattr(opened, "fd", None)  # of a serial port; a socket marks nothing
     marked = text and isinstance(descriptor, int) and mark_damaged(descriptor)
     marks = Marks(line.data_bits) if marked else None
@@ -199,35 +200,28 @@ def connected_ports() -> list[tuple[str, str, str]]:
     return sorted((port.device, port.description or "", port.hwid or "") for port in list_ports.comports())
 
 
-def _not_opened(port: str, baud: int, error: Exception) -> InstrumentError:
+def _why_not_opened(port: str, baud: int, error: Exception) -> tuple[str, str]:
     number = getattr(error, "errno", None)
     words = str(error).lower()
     if "://" in port:
-        what = f"cannot connect: {_first_words(error)}"
         remedy = "is the instrument's server running, and are host and port number right?"
-        return InstrumentError(what, where=port, remedy=remedy)
+        return f"cannot connect: {_first_words(error)}", remedy
     if number == errno.ENOENT or "filenotfound" in words:
         names = ", ".join(name for name, _, _ in connected_ports())
         remedy = f"connected are {names}" if names else "no serial port is connected: plug the adapter in"
-        return InstrumentError(
-            "there is no such port", where=port, remedy=f"{remedy}; see `dbbstation instrument ports`"
-        )
+        return "there is no such port", f"{remedy}; see `dbbstation instrument ports`"
     if number in _BUSY or "access is denied" in words:
         who = ", ".join(holders(port))
         remedy = "close the other program, for example a second monitor or a terminal program"
-        what = f"another program has the port open{f': {who}' if who else ''}"
-        return InstrumentError(what, where=port, remedy=remedy)
+        return f"another program has the port open{f': {who}' if who else ''}", remedy
     if number in {errno.EACCES, errno.EPERM}:
         remedy = f"add yourself to the group that owns it ({_group(port)}) and log in again"
-        return InstrumentError("no permission to open the port", where=port, remedy=remedy)
+        return "no permission to open the port", remedy
     if "baud" in words or (isinstance(error, ValueError) and baud not in serial.Serial.BAUDRATES):
         remedy = "set the instrument to a usual rate such as 9600, 19200 or 115200 and give it with --baud"
-        return InstrumentError(f"the port does not take the baud rate {baud}", where=port, remedy=remedy)
-    return InstrumentError(
-        f"this is no serial port that can be used: {_first_words(error)}",
-        where=port,
-        remedy="see `dbbstation instrument ports`",
-    )
+        return f"the port does not take the baud rate {baud}", remedy
+    what = f"this is no serial port that can be used: {_first_words(error)}"
+    return what, "see `dbbstation instrument ports`"
 
 
 def _group(port: str) -> str:

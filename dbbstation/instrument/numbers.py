@@ -11,7 +11,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from dbbstation.files.yaml.schema import Rules, Schema
-from dbbstation.instrument.fields import Code, Content, FrameParts, NotRepresentable, NotUnderstood
+from dbbstation.instrument.fields import DIGIT, Code, Content, FrameParts, NotRepresentable, NotUnderstood, spelled
 
 
 class Number(Schema):
@@ -199,8 +199,7 @@ class Integer(Number):
         if self.tags:
             top = (1 << self.payload_bits) - 1
             return b"".join(b"[\\x%02x-\\x%02x]" % (tag, tag | top) for tag in self.tags)
-        digit = {"hex": b"[0-9a-f]", "HEX": b"[0-9A-F]"}.get(self.written, b"[\\x00-\\xff]")
-        return digit + b"{%d}" % self.width
+        return DIGIT.get(self.written, b"[\\x00-\\xff]") + b"{%d}" % self.width
 
     def _parsed(self, raw: bytes) -> float:
         if self.written == "bcd":
@@ -234,9 +233,7 @@ class Integer(Number):
         if self.order == "little":
             pieces.reverse()
         raw = bytes(piece | tag for piece, tag in zip(pieces, self.tags or (0,) * self.size, strict=True))
-        if self.written == "binary":
-            return raw
-        return raw.hex().upper().encode() if self.written == "HEX" else raw.hex().encode()
+        return spelled(raw, self.written)
 
 
 class Ieee(Number):

@@ -9,11 +9,11 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from dbbstation.computing.arrays import Floats
 from dbbstation.errors import ModelError, StationError
-from dbbstation.facts.quantities import LimitsDeg, LimitsMm, Mass, Quantity, complaint
+from dbbstation.facts.quantities import LimitsDeg, LimitsMm, Mass, Quantity, sound
 from dbbstation.facts.record import AsArray, Record, Sha256Hex
 from dbbstation.text.written import listed
 
@@ -107,14 +107,12 @@ _UNIT_WITHIN = 0.01
 """Largest deviation of a unit vector's length from one in a file, which has two or three digits."""
 
 
-def _direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+def _no_direction(vector: tuple[float, float, float]) -> str:
     length = math.hypot(*vector)
-    if abs(length - 1.0) > _UNIT_WITHIN:
-        raise complaint(f"a direction has the length 1, not {length:.3g}")
-    return vector
+    return f"a direction has the length 1, not {length:.3g}" if abs(length - 1.0) > _UNIT_WITHIN else ""
 
 
-_Direction = Annotated[tuple[_Component, _Component, _Component], AfterValidator(_direction)]
+_Direction = Annotated[tuple[_Component, _Component, _Component], sound(_no_direction)]
 _SIX_DIRECTIONS = AsArray(tuple[_Direction, _Direction, _Direction, _Direction, _Direction, _Direction])
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
-    from dbbstation.nc.curve import SpanBehind
+    from dbbstation.nc.curve import Behind
     from dbbstation.nc.planner import Planner
     from dbbstation.nc.toolpath import Toolpath
 
@@ -116,7 +116,7 @@ def compensated_parts(
         StationError: a correction exceeds `largest_mm`, or the path has too many pieces.
         ModelError: a source needs data that a program lacks, such as temperatures, or the time if `started_s` is None.
     """
-    before: SpanBehind | None = None
+    before: Behind | None = None
     commanded_before = toolpath.start
 
     def runs_in(part: Toolpath) -> Integers:

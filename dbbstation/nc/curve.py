@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.nc.toolpath import Toolpath
 
+    Behind: TypeAlias = tuple[Floats, Passed]
+    """Pose commanded last, shape (6,) [mm, deg], and the memory of the model's sources."""
+
 LEVER_MM = 100.0
 """The tilt between points may err until a point this far from the tool tip moves by the chord error."""
 
@@ -29,19 +32,6 @@ with 4,096, which are shared between threads."""
 
 HOLDING = 3
 """Iterations that adjust the wanted tilt until the commanded tilt is as programmed. Each iteration reduces the difference to a thousandth."""
-
-
-@dataclass(frozen=True, eq=False)
-class SpanBehind:
-    """State of the model's sources at the end of one part of a toolpath, for the next part.
-
-    Attributes:
-        command: pose commanded last, shape (6,) [mm, deg].
-        passed: memory of the model's sources.
-    """
-
-    command: Floats
-    passed: Passed
 
 
 class CommandCurve:
@@ -61,7 +51,7 @@ class CommandCurve:
         started_s: float | None,
         *,
         hold_tilt: bool = False,
-        before: SpanBehind | None = None,
+        before: Behind | None = None,
     ) -> None:
         self.toolpath = toolpath
         self._model = model
@@ -108,15 +98,15 @@ class CommandCurve:
         return inverse[at_rest]
 
     def _inverted(self, wanted: Motion) -> Floats:
-        passed = None if self._before is None else self._before.passed
-        parts = [] if self._before is None else [self._before.command[None]]
+        command, passed = (None, None) if self._before is None else self._before
+        parts = [] if command is None else [command[None]]
         for start in range(0, len(wanted), PLACES_AT_ONCE):
             stretch = wanted.stretch(slice(start, start + PLACES_AT_ONCE))
             part, passed = self._stretch(passed or begun(self._model, stretch), stretch)
             parts.append(part)
         commands = np.concatenate(parts)
         if passed is not None:
-            self.behind = SpanBehind(commands[-1], passed)
+            self.behind = commands[-1], passed
         return commands
 
     def _stretch(self, passed: Passed, wanted: Motion) -> tuple[Floats, Passed]:

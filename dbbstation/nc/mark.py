@@ -307,17 +307,16 @@ def check_nominal(toolpath: Toolpath) -> None:
     Raises:
         StationError: it is compensated already.
     """
-    how = "says its header" if says_compensated(toolpath) else ""
-    if (
-        not how
-        and toolpath.numbers
-        and any(checksum(toolpath, each) in toolpath.numbers for each in decimals_of(toolpath))
-    ):
-        how = "says the checksum in its line numbers"
-    if not how and is_marked(toolpath):
-        how = "say the last decimals of its poses"
-    if how:
-        raise already_compensated(toolpath.name, how)
+    signs: dict[str, Callable[[], object]] = {
+        "says its header": lambda: says_compensated(toolpath),
+        "says the checksum in its line numbers": lambda: (
+            toolpath.numbers and any(checksum(toolpath, each) in toolpath.numbers for each in decimals_of(toolpath))
+        ),
+        "say the last decimals of its poses": lambda: is_marked(toolpath),
+    }
+    for how, is_there in signs.items():
+        if is_there():
+            raise already_compensated(toolpath.name, how)
 
 
 def check_machine(toolpath: Toolpath, machine: Machine) -> None:

@@ -380,16 +380,11 @@ class ToolpathBuilder:
         """Add the moves of successive lines, poses of shape (k, 6) [mm, deg], at feeds per distance and per angle; None: rapids."""
         kind = RowKind.RAPID if feed is None else RowKind.FEED
         self._add(kind, poses, feed or _NO_FEED, line=line, step=1)
-        if feed is None:
-            self.left = len(self)
-        else:
-            self.fed = len(self)
 
     def rapid(self, pose: Floats, *, line: int = 0, in_machine: bool = False, unknown: int = 0) -> None:
         """Add a move as fast as the machine can."""
         self.unknown = unknown
         self._add(RowKind.RAPID, pose[None], line=line, in_machine=in_machine)
-        self.left = len(self)
 
     def feed(
         self,
@@ -410,7 +405,6 @@ class ToolpathBuilder:
         self.unknown = unknown
         feed = (mm_min, mm_min if deg_min is None else deg_min)
         self._add(RowKind.FEED, poses, feed, line=line, in_machine=in_machine, arc=arc)
-        self.fed = len(self)
 
     @property
     def pose(self) -> Floats:
@@ -513,6 +507,8 @@ class ToolpathBuilder:
             rows["line"] += step * np.arange(len(rows), dtype=np.int32)
         elif corner_mm <= 0.0:
             rows["corners_mm"][:-1] = PIECE_CORNER_MM  # an arc as chords stops only at its own ends
+        self.fed = len(self) if kind == RowKind.FEED else self.fed
+        self.left = len(self) if kind == RowKind.RAPID else self.left
 
 
 def joined(parts: Sequence[Toolpath]) -> Toolpath:

@@ -14,7 +14,7 @@ from dbbstation.errors import InputError, StationError
 from dbbstation.facts.serialise import json_of, read_json
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_known
-from dbbstation.files.kept import Kept, NotedAnchor, Stamp, stamp_of
+from dbbstation.files.kept import Kept, NotedAnchor, stamp_of
 from dbbstation.files.keys import key_of
 from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.event_log import SHORTEST, links_of
@@ -114,7 +114,7 @@ class _File:
 
     name: str
     path: Path
-    stamp: Stamp
+    stamp: str
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import MachineError
@@ -16,12 +16,6 @@ if TYPE_CHECKING:
     from dbbstation.virtual.wire_clock import ScaledClock
 
 
-@dataclass(frozen=True)
-class _Running:
-    run: VirtualRun
-    begin_s: float
-
-
 class VirtualCell:
     """The bar's reading at any virtual time."""
 
@@ -29,7 +23,7 @@ class VirtualCell:
         self.machine = machine
         self._clock = clock
         self._lock = threading.Lock()
-        self._running: _Running | None = None
+        self._running: VirtualRun | None = None
         self._block_mm: float | None = None
         self._origin_s: float | None = None
 
@@ -41,7 +35,7 @@ class VirtualCell:
             return block_mm + self.machine.bar_error_mm + self.machine.noise_mm()
         if running is None:
             return None
-        return running.run.length_mm_at(t_s - running.begin_s) + self.machine.noise_mm()
+        return running.length_mm_at(t_s - running.begin_s) + self.machine.noise_mm()
 
     def mount(self, test: str) -> int:
         """Mount a test's ball again and return the mounting's number.
@@ -82,8 +76,8 @@ class VirtualCell:
         with self._lock:
             self._block_mm = None
             self.machine.restart_noise()
-            self._running = _Running(run, self._clock() + self._clock.stand_s())
-        self._clock.run_until(self._running.begin_s + run.path.duration_s)
+            self._running = run = replace(run, begin_s=self._clock() + self._clock.stand_s())
+        self._clock.run_until(run.end_s)
         return run
 
     def stop(self) -> None:
@@ -96,9 +90,7 @@ class VirtualCell:
     def running(self) -> bool:
         """Return whether the machine moves."""
         with self._lock:
-            return (
-                self._running is not None and self._clock() < self._running.begin_s + self._running.run.path.duration_s
-            )
+            return self._running is not None and self._clock() < self._running.end_s
 
     def status(self) -> dict[str, object]:
         """Return the state as plain values."""
@@ -114,12 +106,12 @@ class VirtualCell:
         if isinstance(self._clock, WaitingClock):
             told["stands_since_s"] = self._clock()
         if running is not None:
-            elapsed_s = min(max(self._clock() - running.begin_s, 0.0), running.run.path.duration_s)
+            elapsed_s = min(max(self._clock() - running.begin_s, 0.0), running.path.duration_s)
             told |= {
-                "test": running.run.test,
-                "direction": running.run.direction.value,
+                "test": running.test,
+                "direction": running.direction.value,
                 "elapsed_s": round(elapsed_s, 3),
-                "duration_s": round(running.run.path.duration_s, 3),
+                "duration_s": round(running.path.duration_s, 3),
             }
         return told
 

@@ -82,6 +82,7 @@ class VirtualRun:
 
     Attributes:
         length_mm: distance plus the bar's error at the path's times, shape (n,).
+        begin_s: in virtual time.
     """
 
     test: str
@@ -89,6 +90,12 @@ class VirtualRun:
     mounting: int
     path: CommandedPath
     length_mm: Floats
+    begin_s: float = 0.0
+
+    @property
+    def end_s(self) -> float:
+        """Return the end in virtual time [s]."""
+        return self.begin_s + self.path.duration_s
 
     def length_mm_at(self, t_s: float) -> float:
         """Return the distance at a time after the start, constant beyond the ends [mm]."""

@@ -6,9 +6,9 @@ import math
 import re
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
-from dbbstation.facts.quantities import BarMm, Quantity, Text, complaint
+from dbbstation.facts.quantities import BarMm, Quantity, Text, sound
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.number_language import number_language
 from dbbstation.files.source_text import without_faults
@@ -60,22 +60,19 @@ def in_run_units(meaning: str, unit: str) -> tuple[float, float]:
     return UNITS[meaning][unit], _OFFSETS.get(unit, 0.0)
 
 
-def _meaning(text: str) -> str:
-    if text not in MEANINGS:
-        raise complaint(f"`{text}` is not a meaning of a column: {', '.join(MEANINGS)}")
-    return text
+def _no_meaning(text: str) -> str:
+    return "" if text in MEANINGS else f"`{text}` is not a meaning of a column: {', '.join(MEANINGS)}"
 
 
-def _zone(text: str) -> str:
-    if not re.fullmatch(r"[+-]\d{2}:\d{2}|UTC|[A-Za-z]+(?:/[A-Za-z_+-]+)+", text):
-        raise complaint(f"`{text}` is no time zone: write such as +01:00 or Europe/Berlin")
-    return text
+def _no_zone(text: str) -> str:
+    is_zone = re.fullmatch(r"[+-]\d{2}:\d{2}|UTC|[A-Za-z]+(?:/[A-Za-z_+-]+)+", text)
+    return "" if is_zone else f"`{text}` is no time zone: write such as +01:00 or Europe/Berlin"
 
 
 class ColumnSchema(Schema):
     """One column of the files."""
 
-    means: Annotated[str, AfterValidator(_meaning)]
+    means: Annotated[str, sound(_no_meaning)]
     """`time`, `angle`, `length` (between the ball centres), `deviation` (of the length from `zero_mm`, longer
     positive), `test`, `direction`, `repeat`, `mounting`, `state`, `started`, `run` (any text, equal in all rows of a
     run), `status`, a further column of run files such as `bar_temp_c`, or `ignored`."""
@@ -132,7 +129,7 @@ class MappingFile(Schema):
     """Division of files with several runs: by a `column` that is `run`, by `gaps` (pauses, restarting times, empty
     lines), or by changes of the angles' `direction`; absent: by columns with test, direction and repeat, else a file is
     one run."""
-    zone: Annotated[str, AfterValidator(_zone)] | None = None
+    zone: Annotated[str, sound(_no_zone)] | None = None
     """Time zone of dates without one, such as `Europe/Berlin` or hours and minutes from UTC; absent: the importing
     computer's."""
 

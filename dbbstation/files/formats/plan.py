@@ -4,11 +4,11 @@ import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag
 
 from dbbstation.errors import Problem
 from dbbstation.facts import of_facts
-from dbbstation.facts.quantities import BarMm, Quantity, Text, complaint, twice
+from dbbstation.facts.quantities import BarMm, Quantity, Text, sound, twice
 from dbbstation.files.formats.jig import (
     BY_CMM,
     UNDER_SPINDLE,
@@ -33,12 +33,6 @@ _RADIANS_BELOW_DEG = 0.6
 """Greatest tilt below which a plan seems to be in radians [deg]: 0.6 rad is 34 deg."""
 
 
-def _once(directions: tuple[str, ...]) -> tuple[str, ...]:
-    if twice(directions):
-        raise complaint("a direction stands here twice")
-    return directions
-
-
 _Tilt = Annotated[float, Quantity("deg", 0, 180, signed=True)]
 
 
@@ -55,7 +49,11 @@ class PathSchema(Schema):
     """Arc travelled before and after the full turn [deg]."""
     feed_in_mm: Annotated[float, Quantity("mm", 0.01, 50, or_zero=True)] = 0.0
     """Distance of the feed-in's start outside the circle, along the bar [mm]."""
-    directions: Annotated[tuple[Literal["ccw", "cw"], ...], Field(min_length=1), AfterValidator(_once)] = ("ccw", "cw")
+    directions: Annotated[
+        tuple[Literal["ccw", "cw"], ...],
+        Field(min_length=1),
+        sound(lambda names: "a direction stands here twice" if twice(names) else ""),
+    ] = ("ccw", "cw")
     """Senses of travel in the order they are run."""
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, ValidationInfo
 from pydantic_core import PydanticKnownError
 
-from dbbstation.facts.quantities import Ordinal, Point, Quantity, TemperatureDegc, Text, complaint
+from dbbstation.facts.quantities import Ordinal, Point, Quantity, TemperatureDegc, Text, complaint, sound
 from dbbstation.facts.record import LEFT_OUT_EMPTY, Moment, OrEmpty, Record, Sha256Hex, Sha256OrEmpty
 from dbbstation.plan.bar import Bar
 from dbbstation.plan.plan import Direction
@@ -164,10 +164,10 @@ class RunEntry(Record):
         return f"{self.test} {self.direction} {self.repeat}"
 
 
-def _sealed(run: RunEntry) -> RunEntry:
-    if run.state is not RunState.RECORDING and not run.sha256:
-        raise complaint(f"the run is {run.state} but has no sha256; only a run that is being recorded may lack it")
-    return run
+def _unsealed(run: RunEntry) -> str:
+    if run.state is RunState.RECORDING or run.sha256:
+        return ""
+    return f"the run is {run.state} but has no sha256; only a run that is being recorded may lack it"
 
 
 _Reading = Annotated[float, Quantity("µm", 0, 5_000, signed=True)]
@@ -300,5 +300,5 @@ class SessionFile(SessionDetails):
     """The controller's nominal machine during the measurement, `dbb-machine/1`."""
     plan: InsidePath
     """The test plan as run, `dbb-plan/1`."""
-    runs: tuple[Annotated[RunEntry, AfterValidator(_sealed)], ...] = ()
+    runs: tuple[Annotated[RunEntry, sound(_unsealed)], ...] = ()
     """Runs in the order they were started."""

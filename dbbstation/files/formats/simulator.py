@@ -5,10 +5,10 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from dbbstation.errors import Faults, Problem
-from dbbstation.facts.quantities import Text, complaint
+from dbbstation.facts.quantities import Text, sound
 from dbbstation.files.source_text import LARGEST_PROGRAM, text_in, without_faults
 from dbbstation.files.yaml.schema import Rules, Schema, read_valid
 
@@ -18,13 +18,11 @@ if TYPE_CHECKING:
     from dbbstation.files.yaml.text import Location, YamlDocument
 
 
-def _name(text: str) -> str:
-    if not text.isidentifier() or text.startswith("_"):
-        raise complaint(f"`{text}` is not a valid name in Python")
-    return text
+def _no_name(text: str) -> str:
+    return "" if text.isidentifier() and not text.startswith("_") else f"`{text}` is not a valid name in Python"
 
 
-Name = Annotated[str, AfterValidator(_name)]
+Name = Annotated[str, sound(_no_name)]
 """A name that Python allows."""
 
 BASE = "Simulator"

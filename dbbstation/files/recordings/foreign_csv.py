@@ -17,7 +17,7 @@ from dbbstation.files.recordings.table_csv import TableFile, parse_table
 from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes, shortened, without_faults
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
     from pathlib import Path
 
 _LANGUAGES = (
@@ -194,17 +194,15 @@ def _encoding(data: bytes) -> str:
     zeros = data[::2].count(0), data[1::2].count(0)
     if max(zeros) > len(data) // 10:  # digits have one in two bytes
         return _WIDE[zeros[0] < zeros[1]]
-    with suppress(UnicodeDecodeError):
-        data.decode("utf-8")
-        return "utf-8"
-    runs = _RUN.findall(data)
-    if all(len(run) <= _WESTERN for run in runs):
+    fits: dict[str, Callable[[str], object]] = {
+        "utf-8": lambda _text: True,
+        "cp1252": lambda _text: all(len(run) <= _WESTERN for run in _RUN.findall(data)),
+        "cp932": lambda text: _JAPANESE.fullmatch("".join(letter for letter in text if not letter.isascii())),
+    }
+    for encoding, is_fit in fits.items():
         with suppress(UnicodeDecodeError):
-            data.decode("cp1252")
-            return "cp1252"
-    with suppress(UnicodeDecodeError):
-        if _JAPANESE.fullmatch("".join(letter for letter in data.decode("cp932") if not letter.isascii())):
-            return "cp932"
+            if is_fit(data.decode(encoding)):
+                return encoding
     return "utf-8"
 
 

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 STEP_S = 0.05
+ROWS = 1500
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +35,10 @@ def table(
     *,
     noise: float = 0.1,
     correlation: float = 0.0,
-    rows: int = 1500,
+    rows: int | None = None,
 ) -> Table:
-    """A table with noise, white or of a first-order process with so much of each value in the next one."""
+    """A table with noise, white or of a first-order process with so much of each value in the next one; `ROWS` rows without a number."""
+    rows = rows or ROWS
     rng = np.random.default_rng(seed)
     t = np.arange(rows) * STEP_S
     q = 30.0 * np.sin(0.69 * t) + 20.0 * np.sin(0.27 * t + 1.0)

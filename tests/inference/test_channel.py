@@ -16,6 +16,7 @@ from dbbstation.inference.levels import Verdict
 from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
 from dbbstation.inference.read_off import CauseFinding
 from dbbstation.inference.settle import settle
+from tests.inference import tables
 from tests.inference.reading import read_by_levels
 from tests.inference.tables import Table, direction, table
 
@@ -55,6 +56,13 @@ def channel(data: Table, laws: tuple[Law, ...] = (), blocks: int = 2) -> Channel
         time=data.t,
         simulated=Variable("simulated", "mm", Kind.LENGTH, data.simulated),
     )
+
+
+@pytest.fixture(autouse=True)
+def fewer_rows(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half the rows; the nightly tests have all."""
+    if "not nightly" in request.config.option.markexpr:
+        monkeypatch.setattr(tables, "ROWS", 750)
 
 
 @cache
@@ -135,7 +143,7 @@ def test_several_pulses_are_found() -> None:
         row = np.arange(len(d.t))
         return 0.3 * np.sum([(row >= k) & (row < k + 40) for k in starts], axis=0)
 
-    found = there(read_by_levels(settle(channel(table(9, pulses))))).values()
+    found = there(read_by_levels(settle(channel(table(9, pulses, rows=1500))))).values()
     assert {finding.form for finding in found} == {"pulses"}
     rows = sorted(stretch for finding in found for stretch in finding.rows)
     assert len(rows) == len(starts)

@@ -17,6 +17,8 @@ from dbbstation.sources.registry import sources_named
 from dbbstation.virtual.truth import random_kinematics
 from studies.virtual_session import draw_session
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 
 class NearGravity(Gravity):
     """Gravity with a ripple of 2 per mille over the length of a strut: 1.4 % of what the geometry leaves of gravity to be seen."""

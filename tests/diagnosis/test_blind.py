@@ -23,7 +23,7 @@ from tests.plant.noise import Noise
 from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import MEANS_OF_TWO_HZ, record
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("few_parts")]
 NAMES = ("gravity", "backlash", "thermal-struts", "bar-drift")
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 

@@ -12,6 +12,8 @@ from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.screw import ScrewLead
 from tests.plant.session import record
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 
 

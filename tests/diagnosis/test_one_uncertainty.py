@@ -24,6 +24,8 @@ from dbbstation.sources.registry import sources_named
 from dbbstation.virtual.truth import random_kinematics
 from studies.virtual_session import draw_session
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 COMPLIANCE_UM_KN = 9.68
 NAME = "strut_compliance_um_kn"
 

@@ -17,6 +17,8 @@ from tests.plant.plan import Path, subset, table_ii_plan
 from tests.plant.session import record
 from tests.sources.runs import random_run
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 GAIN = BarGain()
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 

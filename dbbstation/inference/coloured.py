@@ -350,7 +350,8 @@ class Left:
     """A whitened residual divided by noise, with the fitted directions.
 
     Attributes:
-        axes: orthonormal fitted directions, reduced by priors, shape (n, k).
+        axes: orthonormal fitted directions, reduced by priors, shape (n, k); in Fortran order, so that more are
+            appended quickly.
         whitening: shape (n, n), or None.
     """
 
@@ -370,16 +371,16 @@ class Left:
         noise = coloured.innovation
         size = np.where(np.isfinite(sd), sd, noise / norms(columns))
         rows = np.vstack([columns * (size / noise), np.eye(len(sd))[np.isfinite(sd)]])
-        axes, weighted = np.linalg.qr(rows)[0][: len(columns)], target / noise
+        axes, weighted = np.asfortranarray(np.linalg.qr(rows)[0][: len(columns)]), target / noise
         return cls(weighted - axes @ (axes.T @ weighted), axes, noise, coloured, whitening)
 
     def also(self, columns: Floats, sd: Floats) -> Left:
         """Return the residual beside further whitened columns, shape (n, q), with finite priors [Woodbury]."""
         own = columns * (sd / self.noise)
         beside = own - self.axes @ (self.axes.T @ own)
-        root = cholesky(own.T @ beside + np.eye(len(sd)))
-        axes = np.linalg.solve(root, beside.T).T
-        rest = self.rest - axes @ np.linalg.solve(root, own.T @ self.rest)
+        root = np.linalg.inv(cholesky(own.T @ beside + np.eye(len(sd))))
+        axes = (root @ beside.T).T
+        rest = self.rest - axes @ (root @ (own.T @ self.rest))
         return replace(self, rest=rest, axes=np.hstack([self.axes, axes]))
 
     @cached_property

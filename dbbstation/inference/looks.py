@@ -6,7 +6,6 @@ Sums over bins of a variable give the squares that curves explain, quickly.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -376,11 +375,6 @@ def _left(bank: Bank, columns: Floats, sd: Floats) -> Left:
     return Left.of(columns, sd, bank.target, bank.noise, bank.whitening)
 
 
-def _left_but_for(bank: Bank, left: Left, sd: Floats, but_for: int, own: Floats) -> Left:
-    """Return the residual also beside all of a pattern's columns, shape (n, k), but one."""
-    return left.also(bank.whitened(np.delete(own, but_for, axis=1)), np.delete(sd, but_for))
-
-
 def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) -> tuple[Member, ...]:
     """Return members with places optimised for the present noise."""
     channel = bank.channel
@@ -390,13 +384,11 @@ def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) ->
         if pattern is None or pattern.family not in MOVED or pattern.name not in among:
             continue
         others, sd = _fitted(bank, [*members[:number], *members[number + 1 :]])
-        count = member.width
-        size = channel.size / bank.noise.innovation
+        left, size = _left(bank, others, sd), channel.size / bank.noise.innovation
         if pattern.family in PLACED:
-            better = placed_better(pattern, _left(bank, others, sd), channel.kept, size)
+            better = placed_better(pattern, left, channel.kept, size)
         else:
-            lefts = partial(_left_but_for, bank, _left(bank, others, sd), member.sd[:count])
-            better = refined(pattern, count, lefts, channel, size)
+            better = refined(pattern, left, member.sd[: member.width], channel, size)
         if better.name == pattern.name or better.name in bank.patterns:
             continue
         bank.drop({pattern.name})

@@ -14,7 +14,7 @@ from dbbstation.inference.forms import Stretches
 from dbbstation.inference.patterns import Family, Pattern
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.inference.channel import Channel
@@ -62,13 +62,12 @@ def stretches(left: Left, channel: Channel, size: float) -> list[Pattern]:
     return patterns
 
 
-def refined(
-    pattern: Pattern, count: int, lefts: Callable[[int, Floats], Left], channel: Channel, size: float
-) -> Pattern:
+def refined(pattern: Pattern, left: Left, sd: Floats, channel: Channel, size: float) -> Pattern:
     """Return the pattern's first stretches, with optimised ends, as a pattern.
 
     Args:
-        lefts: function from a stretch's number and all columns, shape (n, count), to the residual without this stretch.
+        left: residual without the pattern.
+        sd: of the stretches' priors, shape (q,).
     """
     clock, kept = channel.row_clock, channel.kept
     by = channel.direction if pattern.family is Family.PULSES_BY_DIRECTION else None
@@ -76,8 +75,8 @@ def refined(
     form = pattern.form
     if not isinstance(form, Stretches):
         return pattern
-    found = list(zip(form.first, form.last, strict=True))[:count]
-    columns = pattern.samples[:, :count].copy()
+    found = list(zip(form.first, form.last, strict=True))[: len(sd)]
+    columns = left.whitened(pattern.samples[kept, : len(sd)])
     # Two stretches with a common edge may be one with a wrong edge plus a compensation. The shorter one is kept only if
     # it is still worth its odds given the others at their best places.
     doubtful = [k for k in range(len(found)) if _shares_an_edge(found, k)]
@@ -87,12 +86,13 @@ def refined(
         # Refinement of the others may have made it too short, also at the end of the rows.
         window[0, 1] = max(window[0, 1], min(window[0, 0] + SHORTEST, int(kept.sum())))
         window[0, 0] = min(window[0, 0], window[0, 1] - SHORTEST)
-        look = _Look(lefts(k, columns), channel, size, factor, window)
+        beside = left.also(np.delete(columns, k, axis=1), np.delete(sd, k))
+        look = _Look(beside, channel, size, factor, window)
         look.tried = pattern.tried
         best = look.best()
         if best is not None and (k not in doubtful or best.worth > 0.0):
             found[k] = look.edges_of(best)
-            columns[:, k] = Stretches(found[k][:1], found[k][1:], clock.response).columns(clock.rows)[:, 0] * factor
+            columns[:, k] = look.column_of(found[k])
     found = [edges for edges, column in zip(found, columns.T, strict=True) if column.any()]
     return _pattern(pattern.family, pattern.variables, found, clock, factor, pattern.tried)
 
@@ -146,7 +146,7 @@ class _Look:
         self._blocks = [(int(a), int(b)) for a, b in ends if b - a >= 2 * SHORTEST]
         self._whole = _cumulative(left.whitened(factor) ** 2)
         self._edges = _squares_of_edges(left.coloured, len(self._rows))
-        self._along_axes = _cumulative(factor[:, None] * left.beside)
+        self._along_axes = _cumulative(np.asfortranarray(factor[:, None] * left.beside))
         self._lengths = _squares(self._along_axes)
         self._total = _cumulative(factor * left.towards)
         self._windows = self._all_windows() if windows is None else windows
@@ -227,10 +227,14 @@ class _Look:
             _, ends = self._best_edges(np.full(len(moves), begins), np.maximum(ends + moves, begins + SHORTEST))
         return begins, ends
 
+    def column_of(self, edges: tuple[float, float]) -> Floats:
+        """Return a stretch's whitened column, shape (n,)."""
+        return self._left.whitened(self._columns(*np.array(edges)[:, None]))[:, 0]
+
     def take(self, window: _Window) -> tuple[float, float]:
         """Add a stretch and return its edges in rows."""
         begins, ends = self.edges_of(window)
-        column = self._left.whitened(self._columns(np.array([begins]), np.array([ends])))
+        column = self.column_of((begins, ends))[:, None]
         self._left = self._left.also(column, np.array([self._size * self._left.noise]))
         self._total = _cumulative(self._factor * self._left.towards)
         total = _cumulative(self._factor * self._left.transposed(self._left.axes[:, -1]))
@@ -287,7 +291,7 @@ def _squares(rows: Floats) -> Floats:
 
 
 def _cumulative(rows: Floats) -> Floats:
-    found = np.zeros((len(rows) + 1, *rows.shape[1:]))
+    found = np.zeros((len(rows) + 1, *rows.shape[1:]), order="F")
     np.cumsum(rows, axis=0, out=found[1:])
     return found
 

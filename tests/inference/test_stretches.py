@@ -134,7 +134,7 @@ def test_a_stretch_that_came_to_be_too_short_is_sought_among_long_enough_ones(rn
     left = Left(rng.normal(0.0, 1.0, rows), np.zeros((rows, 0)), 1.0, Coloured(1.0), None)
     channel = made(np.zeros(rows))
     pattern = _pattern(Family.PULSES, (), [edges], channel.row_clock, np.ones(rows), 10.0)
-    found = refined(pattern, 1, lambda _k, _columns: left, channel, 1.0)
+    found = refined(pattern, left, np.ones(1), channel, 1.0)
     assert np.count_nonzero(found.samples[:, 0]) >= SHORTEST - 1
 
 

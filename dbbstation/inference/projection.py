@@ -10,7 +10,7 @@ from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import cho_solve
+from scipy.linalg import cho_factor, cho_solve
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import ModelComparison, cholesky
@@ -222,6 +222,17 @@ def _less(products: Floats, columns: Floats) -> Floats:
     return products
 
 
+def _factored(products: Floats) -> tuple[Floats, bool]:
+    """Factor products, shape (p, p) in Fortran order, in place; return the argument of `cho_solve`."""
+    diagonal = products.diagonal().copy()
+    try:
+        factor, _ = cho_factor(products, lower=True, overwrite_a=True, check_finite=False)
+    except np.linalg.LinAlgError:
+        np.fill_diagonal(products, diagonal)
+        factor = cholesky(products.T)  # the upper triangle is unchanged
+    return factor, True
+
+
 class BesideBase:
     """Causes with a base projected out.
 
@@ -272,7 +283,7 @@ class BesideBase:
         columns = causes.samples if every else causes.of(used)
         own = used if every else np.arange(len(used))
         along = causes.along[:, used] if every else axes.T @ columns
-        products = causes.gram[np.ix_(used, used)] if every else columns.T @ columns
+        products = (causes.gram.T[np.ix_(used, used)] if every else columns.T @ columns).T  # in Fortran order
         of_base = self._taken @ (along * size)
         # The product matrix has tens of megabytes, so it is changed in place.
         products *= size[:, None]
@@ -281,6 +292,6 @@ class BesideBase:
         products.flat[:: len(used) + 1] += 1.0
         towards = size[:, None] * (columns.T @ targets)[own] - of_base.T @ (self._taken @ (axes.T @ targets))
         values = np.zeros((columns.shape[1], targets.shape[1]))
-        values[own] = size[:, None] * cho_solve((cholesky(products), True), towards, check_finite=False)
+        values[own] = size[:, None] * cho_solve(_factored(products), towards, check_finite=False)
         left = targets - columns @ values
         return left - axes @ (self._taken.T @ (self._taken @ (axes.T @ left)))

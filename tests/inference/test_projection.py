@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.linalg import null_space
+from scipy.linalg import cho_solve, null_space
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import Member
-from dbbstation.inference.projection import BesideBase, CauseColumns
+from dbbstation.inference.projection import BesideBase, CauseColumns, _factored
 from dbbstation.inference.square_root import Columns
 from tests.inference.dense import cause, variant
 
@@ -215,3 +215,12 @@ def test_a_comparison_leaves_the_products_of_the_next_as_they_were(samples, rng,
             comparison = beside.comparison(target if whole else np.where(out, 0.0, target))
             gram = comparison.beside([], np.arange(causes.shape[1]) if whole else own)
             assert np.allclose(gram, expected.T @ expected / NOISE**2, rtol=1e-8)
+
+
+@pytest.mark.parametrize("least", [1.5, -0.15])
+def test_products_are_factored_in_place_or_as_the_prior_is_where_rounding_is_negative(rng, least):
+    turned = np.linalg.qr(rng.normal(size=(4, 4)))[0]
+    products, target = turned @ np.diag([3.0, 79.0, 1e4, least]) @ turned.T, rng.normal(size=4)
+    wanted = turned @ ((turned.T @ target) / [3.0, 79.0, 1e4, max(least, 1.0)])
+    factor = _factored(np.asfortranarray(0.5 * (products + products.T)))
+    np.testing.assert_allclose(cho_solve(factor, target), wanted, rtol=1e-9)

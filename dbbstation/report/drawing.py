@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from dbbstation.plan.plan import Direction
 from dbbstation.report.figure_format import as_svg
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     """Style of a line or marker, by the names of Matplotlib."""
 
     from matplotlib.axes import Axes
+    from matplotlib.backend_bases import RendererBase
     from matplotlib.collections import QuadMesh
     from matplotlib.figure import SubFigure
 
@@ -28,6 +30,14 @@ if TYPE_CHECKING:
 
 class ShownFigure(Figure):
     """A figure that a notebook shows without pyplot."""
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw the figure; to save it, only lay it out first, since Matplotlib then draws it again without a layout."""
+        layout = self.get_layout_engine()
+        if self.canvas.is_saving() and isinstance(layout, ConstrainedLayoutEngine):
+            layout.execute(self)
+        else:
+            super().draw(renderer)
 
     def _repr_svg_(self) -> str:
         return as_svg(self, {}).decode("utf-8")

@@ -91,7 +91,7 @@ ports:
 def test_at_a_port(tmp_path, monkeypatch):
     monkeypatch.setattr("dbbstation.simulators.kept.simulations_folder", lambda: tmp_path / "kept")
     step, speed, found = 0.1, 0.0, []
-    t = step * np.arange(120)
+    t = step * np.arange(80)
     push = 14.0 * np.sin(1.3 * t)
     for k in range(len(t)):  # Euler's steps, as the simulator takes them
         found.append(speed)

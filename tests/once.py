@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import fcntl
 import functools
 import hashlib
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import dbbstation
 from dbbstation.files.inputs import input_book, note_input, open_book
+from dbbstation.simulators.running import Runs
 
 try:
     from cloudpickle import dumps  # comes with `distributed`; writes functions down, too
@@ -37,6 +39,20 @@ OF_SESSIONS = (
 
 STUDIES = ("studies.concealed_gravity.concealed_gravity",)
 """Studies that a document shows and tests look at."""
+
+
+class _Ran:
+    """Simulations that were run, which a figure asks for again."""
+
+    def __init__(self, known: dict[Any, Any]) -> None:
+        self._known = known
+
+    def __call__(self, asks: list[Any]) -> list[Any]:
+        return [self._known[ask] for ask in asks]
+
+
+# What runs simulations holds a lock and processes, which cannot be written down.
+copyreg.pickle(Runs, lambda runs: (_Ran, (runs._known,)))
 
 _Read: TypeAlias = tuple[dict[Path, str], set[Path]]
 """Files that were read while an answer was computed: hashes of those that outputs name, and all."""

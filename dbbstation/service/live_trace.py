@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from math import inf, isnan, nan
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,7 +54,9 @@ class LiveTrace:
         self.largest_um = 0.0
         self.centred: Derived | None = None
         self._count = 0
-        self._step, self._step_from = -1, 0
+        self._step = -1
+        self._kept: list[tuple[float, float]] = []
+        self._range_um = inf, -inf
         self._data = np.empty((2, _FIRST_ROOM))
 
     @classmethod
@@ -94,41 +98,36 @@ class LiveTrace:
         """Add samples in time order."""
         # Strictly inside what is travelled: at its very ends stands the bar while it feeds in and out.
         first, last = -self.circle.overshoot_deg, _TURN_DEG + self.circle.overshoot_deg
-        on_turn = [
-            sample
-            for sample in samples
-            if sample.phi_deg is not None and first < sample.phi_deg < last and 0.0 <= sample.phi_deg < _TURN_DEG
-        ]
-        if not on_turn:
-            return
-        phi = np.array([sample.phi_deg for sample in on_turn], dtype=np.float64)
-        length = np.array([sample.length_mm for sample in on_turn], dtype=np.float64)
-        usable = np.array([sample.status == "ok" for sample in on_turn])
-        deviation = 1e3 * (length - self.circle.bar_mm)
-        # Beyond half the feed-in it is off the circle: a bar that was lifted, or the feed-out.
-        usable &= np.abs(deviation) < 1e3 * self.circle.feed_in_mm / 2.0
-        behind_gap = np.flatnonzero([sample.lost > 0 for sample in on_turn])
-        steps = np.insert(phi // STEP_DEG, behind_gap, phi[behind_gap] // STEP_DEG).astype(np.int64)
-        theta = np.insert(self.circle.theta_deg(phi), behind_gap, np.nan)
-        shown = np.insert(np.where(usable, deviation, np.nan), behind_gap, np.nan)
-        for step in np.unique(steps).tolist():
-            self._take(step, theta[steps == step], shown[steps == step])
-        if usable.any():
-            self.largest_um = max(self.largest_um, largest_size(deviation[usable]))
+        for sample in samples:
+            phi = sample.phi_deg
+            if phi is None or not (first < phi < last and 0.0 <= phi < _TURN_DEG):
+                continue
+            if sample.lost > 0:
+                self._take(phi, nan, nan)
+            length_mm = nan if sample.length_mm is None else sample.length_mm
+            deviation_um = 1e3 * (length_mm - self.circle.bar_mm)
+            # Beyond half the feed-in it is off the circle: a bar that was lifted, or the feed-out.
+            usable = sample.status == "ok" and abs(deviation_um) < 1e3 * self.circle.feed_in_mm / 2.0
+            if usable:
+                self.largest_um = max(self.largest_um, abs(deviation_um))
+            self._take(phi, self.circle.start_deg + self.circle.direction.sign * phi, deviation_um if usable else nan)
 
-    def _take(self, step: int, theta_deg: Floats, deviation_um: Floats) -> None:
-        if step == self._step:
-            kept = self._data[:, self._step_from : self._count]
-            theta_deg = np.concatenate([kept[0], theta_deg])
-            deviation_um = np.concatenate([kept[1], deviation_um])
-            self._count = self._step_from
-        self._step, self._step_from = step, self._count
-        breaks = np.flatnonzero(np.isnan(deviation_um))
-        telling = {int(breaks[0])} if len(breaks) else set()
-        if len(breaks) < len(deviation_um):
-            telling |= {int(np.nanargmin(deviation_um)), int(np.nanargmax(deviation_um))}
-        chosen = sorted(telling)
-        self._append(theta_deg[chosen], deviation_um[chosen])
+    def _take(self, phi_deg: float, theta_deg: float, deviation_um: float) -> None:
+        """Keep a point if it is its step's first break, or its least or greatest deviation."""
+        step = int(phi_deg // STEP_DEG)
+        if step != self._step:
+            self._step, self._kept, self._range_um = step, [], (inf, -inf)
+        elif self._range_um[0] <= deviation_um <= self._range_um[1]:
+            return
+        points = [*self._kept, (theta_deg, deviation_um)]
+        telling = [point for point in points if isnan(point[1])][:1]
+        if known := [point for point in points if not isnan(point[1])]:
+            least, greatest = min(known, key=itemgetter(1)), max(known, key=itemgetter(1))
+            telling += [least, greatest]
+            self._range_um = least[1], greatest[1]
+        self._count -= len(self._kept)
+        self._kept = [point for point in points if any(point is each for each in telling)]
+        self._append(*np.transpose(self._kept))
 
     def _append(self, theta_deg: Floats, deviation_um: Floats) -> None:
         end = self._count + len(theta_deg)

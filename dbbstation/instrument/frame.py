@@ -123,7 +123,7 @@ class Frame(Schema):
         silent = self.is_message and (self.status == "ok" or not self.means)
         yield silent, "a frame without a length is a message: give it a status that is not ok, and means"
         varies = self.bare and any(not isinstance(part, Literally) for part in self.parts)
-        yield varies, "a bare frame has fixed bytes only: nothing else says where it ends"
+        yield varies, "a bare frame has fixed bytes only: its end is unknown otherwise"
 
     @property
     def width(self) -> int | None:

@@ -124,8 +124,7 @@ def load_variants(name_or_file: str | Path) -> list[Protocol]:
     Raises:
         InstrumentError, InputError: as `load_instrument`.
     """
-    variants = _read(_file_of(name_or_file))
-    return list(variants.values())
+    return list(_read(_file_of(name_or_file)).values())
 
 
 def _file_of(name_or_file: str | Path) -> Path:

@@ -97,7 +97,7 @@ class Ask(Schema):
     follow_up: FollowUp | None = None
 
     def _rules(self) -> Rules:
-        yield self.asked != bool(self.request), "modes poll and latch have request bytes, mode stream has none"
+        yield self.asked != bool(self.request), "modes poll and latch have request bytes, stream does not"
         told = self.follow_up is not None and not self.asked
         yield told, "a streaming device takes no requests, also after a fault"
 

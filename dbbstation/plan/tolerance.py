@@ -34,13 +34,7 @@ class CircleFigure(StrEnum):
 OF_A_MODEL = (CircleFigure.CIRCULAR_DEVIATION, CircleFigure.CENTRE_DEVIATION, CircleFigure.MEAN_RADIAL_ERROR)
 """Figures that summaries give for every circle and that a model predicts."""
 
-OF_BOTH_DIRECTIONS = frozenset(
-    {
-        CircleFigure.BIDIRECTIONAL_CIRCULAR_DEVIATION,
-        CircleFigure.MEAN_BIDIRECTIONAL_RADIAL_DEVIATION,
-        CircleFigure.CIRCULAR_HYSTERESIS,
-    }
-)
+OF_BOTH_DIRECTIONS = frozenset(CircleFigure) - {*OF_A_MODEL, CircleFigure.RADIAL_DEVIATION}
 """Figures computed from both directions of a test."""
 
 FILTERED = frozenset(

@@ -7,6 +7,7 @@ import sys
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from inspect import isabstract
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -184,11 +185,8 @@ def _tables(
             continue
         found.append(table)
         for name in needed:
-            faults += table.faults_of(name)
-            missing = np.flatnonzero(~np.isfinite(table.values[name]))
-            if len(missing) and not table.faults_of(name):
-                line = int(table.lines[missing[0]])
-                faults.append(Problem.of(path, f"{name} has no number", "leave out the row, or fill it", line))
+            empty = islice(table.not_finite(name, "leave out the row, or fill it"), 1)
+            faults += table.faults_of(name) or empty
         back = np.flatnonzero(np.diff(table.values[file.time]) <= 0.0)
         if len(back):
             remedy = "order the rows by time, and put each run into its own file"

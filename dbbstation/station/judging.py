@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, TraceError
 from dbbstation.files.formats.session import RunEntry, RunState
-from dbbstation.files.recordings.judged import circles_of_plan, planned_circles, run_of
+from dbbstation.files.recordings.judged import circles_of_plan, run_of
 from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.quality.assigned import Assigned, FormerSitting, effects_of
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
@@ -62,7 +62,7 @@ class RunJudge:
         self._writer = writer
         self._programs = programs or {}
         self._model = model
-        self._planned = planned_circles(writer.session, model)
+        self._planned = () if model is None else circles_of_plan(writer.session, model)
         self._counting: dict[tuple[str, Direction, int], Seen] = {}
         self._waiting: dict[tuple[str, Direction, int], Seen] = {}
         self._rejected: dict[tuple[str, Direction, int], Seen] = {}

@@ -87,7 +87,7 @@ def simulate(
         telling.stage(SIMULATING, mounting - 1, len(order))
         setup, actual = setup_of(test), machine_model
         if not test.ball.place_known:
-            stands = put_up(machine_model, test.circle, setup, SetUp.faultless(), len(runs) * interval_s)
+            stands = put_up(machine_model, test.circle, setup, SetUp(), len(runs) * interval_s)
             actual = replace(machine_model, sources=(*machine_model.sources, *stands))
         for direction in test.directions:
             started_s = len(runs) * interval_s

@@ -34,21 +34,16 @@ class MovingBall(ToolBallOffset):
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """Actual places of balls."""
+    """Errors of balls' places; zero by default."""
 
-    fixed_ball_mm: Floats
-    moving_ball_mm: Floats
+    fixed_ball_mm: Floats = field(default_factory=lambda: np.zeros(3))
+    moving_ball_mm: Floats = field(default_factory=lambda: np.zeros(3))
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, size_mm: float) -> Self:
         """Draw both balls' errors, one standard deviation per axis [mm]."""
         fixed, moving = rng.normal(0.0, size_mm, (2, 3))
         return cls(fixed, moving)
-
-    @classmethod
-    def faultless(cls) -> Self:
-        """Return a set-up without errors."""
-        return cls(np.zeros(3), np.zeros(3))
 
     def read(self, rng: np.random.Generator, uncertainty_mm: float) -> SetUpErrors:
         """Return a micrometer's reading with this standard deviation [mm]."""

@@ -94,11 +94,16 @@ def in_help(group: click.Group = cli) -> Iterator[str]:
 
 
 def in_messages(root: Path) -> Iterator[str]:
-    """Yield sentences of errors and notes: texts of what is raised, of problems, and of what is said or printed."""
+    """Yield sentences of errors and notes: of what is raised, of problems, of rules, and of what is said or printed."""
     for path in sorted((root / "dbbstation").rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            if isinstance(node, ast.Raise) or (
-                isinstance(node, ast.Call) and _name(node) in {"say", "echo", "Problem", "of", "add"}
+        nodes = list(ast.walk(ast.parse(path.read_text("utf-8"))))
+        calls = [node for node in nodes if isinstance(node, ast.Call)]
+        rules = {"_rules", *(_value(node.args[0]) for node in calls if _name(node) == "sound")}
+        for node in nodes:
+            if (
+                isinstance(node, ast.Raise)
+                or (isinstance(node, ast.Call) and _name(node) in {"say", "echo", "Problem", "of", "add"})
+                or (isinstance(node, ast.FunctionDef) and node.name in rules)
             ):
                 for text in _texts(node):
                     yield from sentences_of(text)

@@ -10,7 +10,7 @@ import numpy as np
 
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.own_sources import every_source
-from dbbstation.files.recordings.judged import runs_of
+from dbbstation.files.recordings.judged import circles_of_plan, run_of
 from dbbstation.files.recordings.session import read_session
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.quality.finding import Finding, Name
@@ -96,7 +96,8 @@ def sound(
 def read(folder: Path, model: IdentifiedModel | None = None) -> Sound:
     session = read_session(folder)
     wanted = [(run, session.load(run).recording) for run in session.runs]
-    return Sound([seen(run) for run in runs_of(session, wanted, model)])
+    planned = () if model is None else circles_of_plan(session, model)
+    return Sound([seen(run_of(session, run, recording, model, planned)) for run, recording in wanted])
 
 
 def calibrated(folder: Path, seed: int) -> Sound:

@@ -42,15 +42,8 @@ def judge_session(
     Args:
         model: None: only usual sizes of machine errors are known.
     """
-    return judge(runs_of(session, wanted, model))
-
-
-def runs_of(
-    session: SessionFolder, wanted: Sequence[tuple[RunEntry, Recording]], model: IdentifiedModel | None = None
-) -> tuple[Run, ...]:
-    """Return runs prepared for judging; arguments as of `judge_session`."""
-    planned = planned_circles(session, model)
-    return tuple(run_of(session, run, recording, model, planned) for run, recording in wanted)
+    planned = () if model is None else circles_of_plan(session, model)
+    return judge([run_of(session, run, recording, model, planned) for run, recording in wanted])
 
 
 def run_of(
@@ -78,11 +71,6 @@ def run_of(
         started_s=session.started_s(run),
         bar_stated=session.bar is not None,
     )
-
-
-def planned_circles(session: SessionFolder, model: IdentifiedModel | None) -> tuple[Planned, ...]:
-    """Return a plan's circles as expected by a model; empty without a model."""
-    return () if model is None else circles_of_plan(session, model)
 
 
 def circles_of_plan(session: SessionFolder, model: IdentifiedModel | None) -> tuple[Planned, ...]:

@@ -158,8 +158,7 @@ class SessionWriter(Closing):
             centre_mm=centre_mm,
             instrument=instrument,
         )
-        self._put(entry)
-        self._write("run started")
+        self._noted(entry, "run started")
         return writer
 
     def finish_run(self, writer: RunWriter, counts: Counts | None = None) -> RunEntry:
@@ -173,9 +172,8 @@ class SessionWriter(Closing):
         """
         entry = next(run for run in self.runs if run.path == writer.path)
         digest = writer.seal(counts)
-        done = self._put(replace(entry, state=RunState.COMPLETE, path=writer.sealed_path, sha256=digest, counts=counts))
-        self._write("run sealed")
-        return done
+        done = replace(entry, state=RunState.COMPLETE, path=writer.sealed_path, sha256=digest, counts=counts)
+        return self._noted(done, "run sealed")
 
     def judge(self, run: RunEntry, *, accepted: bool, reason: str = "") -> RunEntry:
         """Note a sealed run as `accepted` or `rejected`.
@@ -189,9 +187,7 @@ class SessionWriter(Closing):
         if run.state is RunState.RECORDING:
             raise OutputError("a run that is not complete cannot be judged", where=run.label, remedy="run it again")
         state = RunState.ACCEPTED if accepted else RunState.REJECTED
-        judged = self._put(replace(run, state=state, reason=reason))
-        self._write(state.value)
-        return judged
+        return self._noted(replace(run, state=state, reason=reason), state.value)
 
     def note(self, note: Note) -> None:
         """Add a note.
@@ -219,9 +215,7 @@ class SessionWriter(Closing):
         digest = sha256_of(path)
         entry = replace(found, state=RunState.COMPLETE, sha256=digest)
         self.session.load(entry)
-        taken = self._put(entry)
-        self._write("taken in")
-        return taken
+        return self._noted(entry, "taken in")
 
     def add_program(self, name: str, content: bytes, *, model_sha256: str = "") -> CommandedProgram:
         """Keep an NC program; an equal one is reused.
@@ -241,6 +235,11 @@ class SessionWriter(Closing):
         keep_copies(session.folder, found)
         runs = chained(session.runs)
         self.session = replace(session, runs=runs, seal=sealed_over(found, runs))
+
+    def _noted(self, entry: RunEntry, what: str) -> RunEntry:
+        put = self._put(entry)
+        self._write(what)
+        return put
 
     def _put(self, entry: RunEntry) -> RunEntry:
         runs = tuple(({run.key: run for run in self.runs} | {entry.key: entry}).values())

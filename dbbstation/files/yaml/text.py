@@ -173,31 +173,21 @@ class _BoundedScanner(Scanner):
 class _Parser(Parser):
     """Looks up its scanner and resolver once, not at every token: a seventh of the time."""
 
-    @functools.cached_property
-    def scanner(self) -> Any:  # noqa: ANN401 - as in ruamel.yaml
-        return super().scanner
-
-    @functools.cached_property
-    def resolver(self) -> Any:  # noqa: ANN401 - as in ruamel.yaml
-        return super().resolver
+    scanner = functools.cached_property(vars(Parser)["scanner"].fget)
+    resolver = functools.cached_property(vars(Parser)["resolver"].fget)
 
 
 class _Counting(Composer):
     """Counts nodes, depth and time while composing, before memory fills."""
+
+    parser = functools.cached_property(vars(Composer)["parser"].fget)
+    resolver = functools.cached_property(vars(Composer)["resolver"].fget)
 
     def __init__(self, loader: Any = None) -> None:  # noqa: ANN401 - a class of ruamel.yaml without a name of its own
         super().__init__(loader)
         self._nodes = 0
         self._depth = 0
         self._until_s = time.monotonic() + LONGEST_S
-
-    @functools.cached_property
-    def parser(self) -> Any:  # noqa: ANN401 - as in ruamel.yaml
-        return super().parser
-
-    @functools.cached_property
-    def resolver(self) -> Any:  # noqa: ANN401 - as in ruamel.yaml
-        return super().resolver
 
     def compose_node(self, parent: Node | None, index: Any) -> Node | None:  # noqa: ANN401 - as in ruamel.yaml
         mark = self.parser.peek_event().start_mark

@@ -97,14 +97,7 @@ class Moves(Modes):
 
         code = block.codes[ModalGroup.SMOOTHING]
         other = block.words.keys() - set("XYIJPQ") or {*block.codes} & {ModalGroup.MOTION, ModalGroup.ONCE}
-        if (
-            not named
-            or other
-            or self._plane != 0
-            or self._cutter is not None
-            or self._absolute_centres
-            or self._left_contour
-        ):
+        if not named or any((other, self._plane, self._cutter, self._absolute_centres, self._left_contour)):
             what = f"{name('G', code.value)} is a curve in X and Y, without G41, G42, G90.1 and another motion"
             raise block.fault(what, CURVES, code)
         unknown = unplaced(self._state.pose)

@@ -152,16 +152,8 @@ class _Interpreter(Moves):
     def _ran_lines(self, first: int) -> bool:
         """Run this line of axes together with those that follow; return False if it must run alone."""
         ready = self._moved and self._absolute and self._motion in {RAPID, LINEAR}
-        if (
-            not ready
-            or self._per_move
-            or self._upright
-            or self.path.unknown
-            or self._cutter
-            or self._unsure_feed
-            or self._since_cycle
-            or first < self._alone_until
-        ):
+        alone = self._per_move, self._upright, self.path.unknown, self._cutter, self._unsure_feed, self._since_cycle
+        if not ready or first < self._alone_until or any(alone):
             return False
         lines, unit_mm = self.flow.plain_lines(), self._state.unit_mm
         if len(lines.axes) < LEAST_LINES:

@@ -116,9 +116,7 @@ class ValueReader:
             return self.bracket()
         word = _WORD.match(self._text, self.position)
         if word is None:
-            raise self._place.fault(
-                at + 1, "a number is missing here", "write a number, a parameter or [an expression]"
-            )
+            raise self._fault(at, "a number is missing here", "write a number, a parameter or [an expression]")
         return self._function(word)
 
     def expression(self) -> float:
@@ -130,7 +128,7 @@ class ValueReader:
         at = self._expect("[")
         self._depth += 1
         if self._depth > DEEPEST:
-            raise self._place.fault(at + 1, f"more than {DEEPEST} nested brackets", "write it in several lines")
+            raise self._fault(at, f"more than {DEEPEST} nested brackets", "write it in several lines")
         value = self._level(0)
         self._expect("]")
         self._depth -= 1
@@ -142,7 +140,7 @@ class ValueReader:
         if self.blanks() == "<":
             end = self._text.find(">", self.position)
             if end < 0:
-                raise self._place.fault(at + 1, "the name of a parameter lacks its closing >", "close it")
+                raise self._fault(at, "the name of a parameter lacks its closing >", "close it")
             name = closed_up(self._text[self.position + 1 : end]).lower()
             self.position = end + 1
             return name
@@ -150,9 +148,7 @@ class ValueReader:
         if math.isnan(number):
             return 1
         if abs(number - round(number)) > EQUAL or not 1 <= round(number) <= MOST_PARAMETER:
-            raise self._place.fault(
-                at + 1, f"#{number:g} is no parameter", f"use a whole number from 1 to {MOST_PARAMETER}"
-            )
+            raise self._fault(at, f"#{number:g} is no parameter", f"use a whole number from 1 to {MOST_PARAMETER}")
         return round(number)
 
     def blanks(self) -> str:
@@ -161,14 +157,15 @@ class ValueReader:
             self.position += 1
         return self._text[self.position : self.position + 1]
 
+    def _fault(self, at: int, what: str, remedy: str) -> BadLine:
+        return self._place.fault(at + 1, what, remedy)
+
     def _parameter_value(self) -> float:
         at, which = self.position, self.parameter()
         value = self._value_of(which)
         if value is None:
             what = f"{shown(which)} is read before the program sets it: its value is the control's"
-            raise self._place.fault(
-                at + 1, what, "set it in the program, or give LinuxCNC's parameter file with --parameters"
-            )
+            raise self._fault(at, what, "set it in the program, or give LinuxCNC's parameter file with --parameters")
         return value
 
     def _function(self, word: re.Match[str]) -> float:
@@ -180,9 +177,7 @@ class ValueReader:
             self._expect("]")
             return float(self._value_of(which) is not None)
         if name != "ATAN" and name not in _FUNCTIONS:
-            raise self._place.fault(
-                at + 1, f"{word[0]!r} is no function", f"write a number, or one of {', '.join(_FUNCTIONS)}"
-            )
+            raise self._fault(at, f"{word[0]!r} is no function", f"write a number, or one of {', '.join(_FUNCTIONS)}")
         first = self.bracket()
         if name != "ATAN":
             return self._computed(at, _FUNCTIONS[name], first)
@@ -210,14 +205,14 @@ class ValueReader:
         except (ArithmeticError, ValueError):
             value = math.nan
         if not math.isfinite(value) or isinstance(value, complex):
-            raise self._place.fault(at + 1, "this has no value", "check the expression")
+            raise self._fault(at, "this has no value", "check the expression")
         return value
 
     def _expect(self, letter: str) -> int:
         """Skip a character; return its index."""
         found, at = self.blanks(), self.position
         if found != letter:
-            raise self._place.fault(at + 1, f"{letter!r} is missing here", "check the brackets of the expression")
+            raise self._fault(at, f"{letter!r} is missing here", "check the brackets of the expression")
         self.position += 1
         return at
 

@@ -60,8 +60,10 @@ def at_point(
 
 def by_amplitudes(reading: BarReading, source: ErrorSource, machine: Machine, point: Sequence[float]) -> Floats:
     """Return a reading's derivative by a source's amplitudes at nonlinear parameters, shape (n, a)."""
-    derivative = reading.by_source(source, machine, at_point(source, machine, point))
-    return derivative[:, ~is_shape(source, machine)]
+    shaped = is_shape(source, machine)
+    values = np.zeros(len(shaped))
+    values[shaped] = point
+    return reading.by_source(source, machine, values)[:, ~shaped]
 
 
 def by_terms(reading: BarReading, layout: Layout, x: Floats) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from dbbstation.calibration.checks.scatter import misfit_of
@@ -16,6 +18,7 @@ from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import sources_named
 from dbbstation.virtual.truth import random_kinematics
 from studies.virtual_session import draw_session
+from tests.plant.plan import ALL
 
 PLAY_UM, DRIFT_UM, CONSTANT_S = 4.0, 3.0, 1800.0
 
@@ -26,8 +29,8 @@ VALUES = {
 }
 
 
-def joint_fit(machine, names, noise_mm=3e-4, *, unexplained=None):
-    """Diagnosis of fifteen circles on a machine with these sources, found where nothing is left unexplained."""
+def joint_fit(machine, names, noise_mm=3e-4, *, unexplained=None, tests=ALL):
+    """Diagnosis of fifteen circles, or those of `tests`, on a machine with these sources, found where nothing is left unexplained."""
     sources = sources_named(names)
     truth = MachineModel(
         machine,
@@ -37,6 +40,7 @@ def joint_fit(machine, names, noise_mm=3e-4, *, unexplained=None):
         ),
     )
     plan = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
+    plan = replace(plan, tests={name: test for name, test in plan.tests.items() if name in tests})
     runs = draw_session(truth, plan, np.random.default_rng(7), noise_mm, 360)
     before = calibrate(machine, runs)
     after = before

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -16,7 +17,10 @@ from dbbstation.diagnosis.source_curves import gains_by_test, source_curves
 from dbbstation.inference.levels import Followed, FollowsAnswer
 from dbbstation.report.diagnosis_figure import diagnosis_figure, draw_unexplained
 from dbbstation.results.frame import OnePanel
-from tests.diagnosis.joint_fits import joint_fit
+from tests.diagnosis import joint_fits
+from tests.plant.plan import EIGHT
+
+joint_fit = partial(joint_fits.joint_fit, tests=EIGHT)
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -186,11 +186,8 @@ class ChoiceField(_Codes):
         yield self.codes[0].status != "ok", what
 
     def pattern(self) -> bytes:
-        return (
-            b"(?:"
-            + b"|".join(re.escape(raw) for raw in sorted((c.code for c in self.codes), key=len, reverse=True))
-            + b")"
-        )
+        longest_first = sorted((one.code for one in self.codes), key=len, reverse=True)
+        return b"(?:" + b"|".join(map(re.escape, longest_first)) + b")"
 
     def read(self, raw: bytes, found: FrameParts) -> None:
         code = next(code for code in self.codes if code.code == raw)

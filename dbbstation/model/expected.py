@@ -171,9 +171,8 @@ def _of_model(
         variance, axes = np.linalg.eigh(identified.covariance)
         root = axes * np.sqrt(np.maximum(variance, 0.0))
         yield _Acting(("model", ""), by_parameter @ root[rows], at_a_pose=True)
-        if (
-            identified.unseen is not None
-        ):  # parameters held at nominal have their usual size, as on an uncalibrated machine
+        # Parameters held at nominal have their usual size, as on an uncalibrated machine.
+        if identified.unseen is not None:
             yield _Acting(("held by the model", ""), by_parameter @ identified.unseen[:, rows].T, at_a_pose=True)
 
 

@@ -60,6 +60,9 @@ def lines(tmp_path_factory):
     shutil.copytree(SMALL.parent / "logged", folder / "many" / "logged")
     (folder / "model.yaml").write_bytes(MODEL.read_bytes())
     found["calibrate"] = ["calibrate", SMALL]
+    table = (FIXTURES / "tables" / "axis.csv").read_text("utf-8").splitlines(keepends=True)
+    (folder / "axis.csv").write_text("".join(table[:200]), "utf-8")
+    found["mismatch"][1] = folder / "axis.csv"
     found["mismatch-simulator"] = [
         "mismatch",
         PENDULUM / "pendulum.csv",

@@ -6,7 +6,7 @@ Amzallag et al., Int. J. Fatigue 16 (1994) 287, sec. 3.1]. A turn is a retreat b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,19 +39,8 @@ MOST_STUCK = 0.3
 """Largest usable share of stuck samples."""
 
 
-@dataclass(frozen=True, eq=False)
-class Even:
-    """Even signals, shape (n,) each, with notes."""
-
-    t_s: Floats
-    position_mm: Floats
-    force_n: Floats
-    rate_hz: float
-    notes: tuple[str, ...]
-
-
-def evenly_sampled(recording: DriveRecording) -> Even:
-    """Return the longest gapless stretch, interpolated if uneven beyond the rounding of times.
+def evenly_sampled(recording: DriveRecording) -> tuple[DriveRecording, float, list[str]]:
+    """Return the longest gapless stretch, interpolated if uneven beyond the rounding of times, its rate [Hz] and notes.
 
     Raises:
         CalibrationError: fewer than a hundred gapless samples.
@@ -84,8 +73,10 @@ def evenly_sampled(recording: DriveRecording) -> Even:
         )
         even = np.linspace(t[0], t[-1], len(t))
         position, force = CubicSpline(t, position)(even), np.interp(even, t, force)
-        return Even(even, position, force, float((len(t) - 1) / (t[-1] - t[0])), tuple(notes))
-    return Even(start + step * count, position, force, float(1.0 / step), tuple(notes))
+        rate = (len(t) - 1) / (t[-1] - t[0])
+    else:
+        even, rate = start + step * count, 1.0 / step
+    return replace(recording, t_s=even, position_mm=position, force_n=force), float(rate), notes
 
 
 def _printed_resolution(t: Floats) -> float:

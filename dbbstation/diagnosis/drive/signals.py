@@ -261,9 +261,8 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     Raises:
         CalibrationError: too short, no motion, dead or saturated force, or unsuitable cut-off.
     """
-    even = evenly_sampled(recording)
-    notes = list(even.notes)
-    rate, position = even.rate_hz, 1e-3 * even.position_mm
+    even, rate, notes = evenly_sampled(recording)
+    position = 1e-3 * even.position_mm
     if not np.ptp(position) > 0.0:
         raise CalibrationError(
             "the position does not change", where=recording.name, remedy="record the drive while it travels to and fro"

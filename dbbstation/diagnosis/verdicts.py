@@ -114,7 +114,7 @@ class _CircleJudge(CauseJudge):
         return ambiguous(self._rows, self._in_words(others), text)
 
     def _group_of(self, name: str) -> tuple[str, ...]:
-        groups = [(*one.form.names, *one.form.not_worse) for one in self._levels.levels.follows if one.form is not None]
+        groups = [(*one.form.names, *one.form.not_worse) for one in self._levels.follows if one.form is not None]
         groups += [equal for equal in self._classes.values() if len(equal) > 1]
         groups += [(own, *others) for own, others in self._alternatives.ambiguities.items()]
         return next((tuple(n for n in group if JOINED not in n) for group in groups if name in group), ())

@@ -18,7 +18,21 @@ from dbbstation.inference.channel import Kind, impossible, impossible_beside
 from dbbstation.inference.coloured import widening_of
 from dbbstation.inference.folds import weighted_jackknife
 from dbbstation.inference.forms import HARMONICS
-from dbbstation.inference.levels import ABSENT, Acts, Gains, Said, Verdict, VerdictsByLevel, ambiguous, open_to
+from dbbstation.inference.levels import (
+    ABSENT,
+    JOINED,
+    OUT,
+    SURE,
+    Acts,
+    FollowsAnswer,
+    Gains,
+    Said,
+    Verdict,
+    ambiguous,
+    open_to,
+    too_many,
+    within_a_step,
+)
 from dbbstation.inference.looks import IN_TIME
 from dbbstation.inference.model_comparison import SCALES, amplitude_size, slices_of
 from dbbstation.inference.patterns import ZEROS, Family, covers_turns, zeros_text
@@ -33,7 +47,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.channel import Law
     from dbbstation.inference.folds import KnownGains
     from dbbstation.inference.followed import ChosenWithoutParts
-    from dbbstation.inference.levels import Levels
+    from dbbstation.inference.levels import Followed, Levels
     from dbbstation.inference.model_comparison import Cause, Member, Variant
     from dbbstation.inference.settle import Settled
     from dbbstation.inference.square_root import Solution
@@ -262,7 +276,7 @@ class CauseJudge:
         self._classes = self._alternatives.classes
         self._values = {m.name: (v, c) for m, v, c in settled.comparison.estimated(self._best.members)}
         self._own = dict(zip(self._members, slices_of(self._best.members), strict=True))
-        self._levels = VerdictsByLevel(settled, levels, self._pushes())
+        self._levels = levels
         absent = [cause for cause in settled.causes if cause.name not in self._members]
         scan = settled.comparison.scan(self._best.members, absent)
         self._beside = {c.name: (float(g), m) for c, g, m in zip(scan.causes, scan.log_factor, scan.best, strict=True)}
@@ -376,7 +390,7 @@ class CauseJudge:
 
     def _verdict(self, cause: Cause, member: Member | None, probability: float, sigmas: float) -> Said:
         if member is not None or self._instead_of(cause.name):
-            return self._levels.of_member(cause.name, probability, sigmas, self._acts(cause.name))
+            return self._of_member(cause.name, probability, sigmas)
         if why := self._impossible_in_place(cause):
             return Verdict.RULED_OUT, (), why
         if alike := self._alike(cause.name):
@@ -386,21 +400,59 @@ class CauseJudge:
         others = self._alternatives.ambiguity(cause.name)
         return ambiguous(self._rows, others, f"These {self._rows} do not decide it.")
 
+    def _of_member(self, name: str, probability: float, sigmas: float) -> Said:
+        """Return the verdict on a member, given its size in standard deviations.
+
+        A class may be certain although each of its members is uncertain. Held-out parts cannot refute a single member then.
+        """
+        rows, classes = self._rows, [one for one in self._levels.follows if name in one.members]
+        answers = {one.answer for one in classes}
+        unsure = probability < SURE and FollowsAnswer.DOES_NOT_PREDICT in answers
+        if unsure or FollowsAnswer.UNDECIDED in answers:
+            return ambiguous(rows, (), f"These {rows} do not decide it.")
+        if sigmas < OUT:
+            return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
+        if self._acts(name) is Acts.ONCE or any(one.in_time for one in classes):
+            return self._happened(name)
+        if FollowsAnswer.DOES_NOT_PREDICT in answers:
+            why = f"It was found in these {rows}, and held-out parts gain nothing by it."
+            return Verdict.DOES_NOT_PREDICT, (), why
+        if FollowsAnswer.NOT_TESTED in answers and self._levels.correction is False:
+            why = "With everything that was found these rows are left worse than as simulated."
+            return Verdict.DOES_NOT_PREDICT, (), why
+        return _of_laws(classes, name, rows)
+
+    def _happened(self, name: str) -> Said:
+        pushes = self._pushes()
+        every = [size for own in pushes.values() for size in own]
+        if name in pushes and (why := within_a_step(pushes[name], self._settled.channel.step) or too_many(every)):
+            return Verdict.AMBIGUOUS, (), why
+        refuted = any(one.answer is FollowsAnswer.DOES_NOT_PREDICT for one in self._levels.follows)
+        if refuted and self._levels.correction is False:
+            return Verdict.AMBIGUOUS, (), MAKES_UP
+        return Verdict.HAPPENED, (), ""
+
     def _instead_of(self, name: str) -> frozenset[str]:
-        return frozenset() if name in self._members else self._levels.instead_of(name)
+        """Return members that a named law outside the set replaces."""
+        replaced = (one.members for one in self._levels.follows if _named(one, name) and name not in self._members)
+        return frozenset[str]().union(*replaced)
 
     def _alike(self, name: str) -> str:
         """Return a member equivalent to a cause or ambiguous with it; may be empty."""
         equal = any(name in names for names in self._classes.values())
         if self.is_catalogue and not equal and self._settled.posterior.probability([name]) <= ABSENT:
             return ""
-        if found := self._levels.alike(name):
-            return found
+        for one in self._levels.follows:
+            if one.form is not None and name in (*one.form.not_worse, *one.form.names):
+                return next(other for other in (*one.form.names, *sorted(one.members)) if other != name)
         unsure = self._alternatives.ambiguities
         return next((one for of in (self._classes, unsure) for one, names in of.items() if name in names), "")
 
     def _equal(self, name: str) -> tuple[str, ...]:
-        return self._levels.equivalent(name) or self._classes.get(name, (name,))
+        """Return a named law and its equivalents, or a cause and its class."""
+        forms = [one.form for one in self._levels.follows if one.form is not None and one.form.name == name]
+        same = dict.fromkeys(other for form in forms for other in form.not_worse)
+        return (name, *same) if same else self._classes.get(name, (name,))
 
     def _impossible_in_place(self, cause: Cause) -> str:
         shown = replace(self._beside[cause.name][1], scale=float(SCALES[-1]))
@@ -451,6 +503,23 @@ class CauseJudge:
         fitted = self._settled.bank.base_values(-effect) - self._without
         rest = kept - (self._settled.channel.base.samples @ fitted)[self._settled.channel.kept]
         return concealed(kept - kept.mean(), rest)
+
+
+MAKES_UP = "Held-out parts are predicted worse than as simulated, and something beside it predicts none: this may make up for that."
+"""Why a single event is uncertain: its probability assumes effects that other rows refute."""
+
+
+def _named(one: Followed, name: str) -> bool:
+    return one.form is not None and name in one.form.names
+
+
+def _of_laws(classes: Sequence[Followed], name: str, rows: str) -> Said:
+    if all(_named(one, name) for one in classes):
+        return Verdict.IDENTIFIED, (), ""
+    forms = [one.form for one in classes if one.form is not None and not _named(one, name)]
+    rivals = [form.rivals.get(name) or (*form.names, *form.not_worse) for form in forms]
+    others = tuple(dict.fromkeys(n for names in rivals for n in names if n != name and JOINED not in n))
+    return ambiguous(rows, others, "No single law was named here.")
 
 
 NOT_NEEDED = "It would have been seen at its plausible size and was not needed."

@@ -19,7 +19,6 @@ from dbbstation.inference.levels import (
     FollowsAnswer,
     Levels,
     Verdict,
-    VerdictsByLevel,
 )
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
@@ -117,13 +116,12 @@ def _still(folder, *mechanisms):
 def test_only_a_group_of_which_one_is_there_is_ambiguous(group, verdict):
     judge = object.__new__(_CircleJudge)
     undecided = Followed((("strut-force",),), (), FollowsAnswer.UNDECIDED, 0.7, {}, 1.0, ("play",))
-    settled = SimpleNamespace(channel=SimpleNamespace(rows_are="tests"))
     levels = Levels(
         DifferenceFound(Differs.YES, "", 1.0, 1.0, matters_stated=False, independent_samples=900.0, detectable=()),
         (undecided,),
         None,
     )
-    judge._levels = VerdictsByLevel(settled, levels, {})
+    judge._levels = levels
     judge._classes, judge._rows, judge._acts = {"play": ("play",)}, "tests", lambda _: Acts.ALWAYS
     judge._joint = SimpleNamespace(unmodelled=SimpleNamespace(follows={}))
     judge._alternatives = SimpleNamespace(probability=lambda _: 0.7, ambiguity=lambda _: group)

@@ -27,7 +27,6 @@ from dbbstation.inference.hypotheses import SearchWork
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels import (
     TIME,
-    Acts,
     DensityGains,
     Detectable,
     DifferenceFound,
@@ -37,7 +36,6 @@ from dbbstation.inference.levels import (
     LawForm,
     Levels,
     Verdict,
-    VerdictsByLevel,
     difference_of,
 )
 from dbbstation.inference.levels_of import (
@@ -52,7 +50,7 @@ from dbbstation.inference.levels_of import (
     slow_chance,
 )
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES
-from dbbstation.inference.read_off import Trial, read_off
+from dbbstation.inference.read_off import CauseJudge, Trial, read_off
 from dbbstation.inference.settle import Beginning, settle
 from dbbstation.results.levels_text import level_sentences
 from tests.inference.tables import direction, table
@@ -339,7 +337,7 @@ def test_a_verdict_is_read_off_the_level_of_the_class(both, answer, form, verdic
 def said_of_hysteresis(settled, form, answer, probability):
     follows = Followed((("q",),), (), answer, 1.0, {}, 1.0, ("curve over q", "hysteresis of q"), form=form)
     levels = replace(levels_of(settled, left_over(settled), None), follows=(follows,))
-    return VerdictsByLevel(settled, levels, {}).of_member("hysteresis of q", probability, 9.0, Acts.ALWAYS)
+    return CauseJudge(settled, Trial(), levels)._of_member("hysteresis of q", probability, 9.0)
 
 
 @pytest.mark.parametrize(("probability", "verdict"), [(0.96, Verdict.DOES_NOT_PREDICT), (0.9, Verdict.AMBIGUOUS)])

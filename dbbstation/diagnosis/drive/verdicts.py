@@ -96,10 +96,7 @@ class Verdicts(CauseJudge):
     def effects(self) -> tuple[UnexplainedForce, ...]:
         """Return present unmodelled forces, largest first."""
         sure = {
-            name
-            for one in self._levels.levels.follows
-            if one.answer is not FollowsAnswer.UNDECIDED
-            for name in one.members
+            name for one in self._levels.follows if one.answer is not FollowsAnswer.UNDECIDED for name in one.members
         }
         found = []
         for one in self._raw:

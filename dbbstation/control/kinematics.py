@@ -15,6 +15,7 @@ from dbbstation.machine.kinematics import inverse, strut_jacobian
 from dbbstation.machine.statics import GRAVITY_M_S2
 from dbbstation.machine.travel import middle
 from dbbstation.sources.contract import Need, c_constant
+from dbbstation.sources.laws.temperature import chosen
 from dbbstation.sources.laws.weights import masses_for_c, strut_compliance
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ class Component:
 class _Part:
     fitted: Fitted
     form: CForm
+    thermometers: tuple[str, ...]
 
     @property
     def name(self) -> str:
@@ -120,7 +122,7 @@ def component(
         )
     machine = model.as_found
     parts = [_part(fitted, machine, thermometers) for fitted in acting if fitted.source.name not in left_out]
-    columns = tuple(dict.fromkeys(column for part in parts for column in part.form.thermometers))
+    columns = tuple(dict.fromkeys(column for part in parts for column in part.thermometers))
     kernel, frame = (package_text(f"control/{file}") for file in ("kernel.c", "component.comp"))
     mathematics = "\n".join([_constants(machine, parts, columns), kernel, _sources(parts, columns)])
     watched = (
@@ -146,9 +148,11 @@ def component(
 
 def _part(fitted: Fitted, machine: Machine, thermometers: Collection[str]) -> _Part:
     source = fitted.source
-    form = source.c_form(machine, fitted.values, thermometers)
+    form = source.c_form(machine, fitted.values)
     if form is not None:
-        return _Part(fitted, form)
+        remedy = "name the thermometers of the control with --thermometers, or leave the source out with --leave-out"
+        known = chosen(source.name, form.thermometers or ((),), thermometers, "the control has no", remedy)
+        return _Part(fitted, form, known)
     history = source.has_history or Need.TIME in source.needs
     why = "depends on the way so far or on time, which a kinematics does not know" if history else "has no form in C"
     entry = "; its width then goes into [JOINT_n]BACKLASH" if source.name == HELD_BY_BACKLASH else ""
@@ -189,8 +193,8 @@ def _sources(parts: Sequence[_Part], columns: Sequence[str]) -> str:
     for number, part in enumerate(parts):
         values = {"v": part.fitted.values} if re.search(r"\bv\b", part.form.body) else {}
         constants: dict[str, ArrayLike] = {**values, **part.form.constants}
-        if part.form.thermometers:
-            constants["thermometer"] = [columns.index(column) for column in part.form.thermometers]
+        if part.thermometers:
+            constants["thermometer"] = [columns.index(column) for column in part.thermometers]
         lines = [*(c_constant(key, value) for key, value in constants.items()), *part.form.body.split("\n")]
         body = "\n".join(f"    {line}" for line in lines)
         functions.append(f"static void of_{part.name}(const seen_t *at, effect_t *e)\n{{\n{body}\n}}\n")

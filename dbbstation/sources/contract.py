@@ -24,7 +24,7 @@ from dbbstation.machine.kinematics import Struts, inverse
 from dbbstation.trace.columns import WithLogged
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -44,13 +44,13 @@ class CForm:
     Attributes:
         by_pose: False if it uses only lengths of `at`, so the pose need not be computed.
         constants: further numbers or arrays by name.
-        thermometers: columns without their unit.
+        thermometers: columns without their unit, best choice first.
     """
 
     body: str
     by_pose: bool = True
     constants: Mapping[str, ArrayLike] = field(default_factory=dict)
-    thermometers: tuple[str, ...] = ()
+    thermometers: tuple[tuple[str, ...], ...] = ()
 
 
 def c_constant(name: str, value: ArrayLike) -> str:
@@ -590,16 +590,14 @@ class ErrorSource(ABC):
         self,
         machine: Machine,  # noqa: ARG002
         values: Floats,  # noqa: ARG002
-        thermometers: Collection[str] = (),  # noqa: ARG002
     ) -> CForm | None:
         """Return the effect as C for a kinematics inside a control; by default None.
 
         Args:
             machine: with the identified compliance.
-            thermometers: columns without unit that the control has.
 
         Raises:
-            ModelError: machine file or control lack an input.
+            ModelError: the machine file lacks an input.
         """
         return None
 

@@ -11,8 +11,6 @@ from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, 
 from dbbstation.sources.laws.weights import MM_PER_N, platform_masses, stated_tensions
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
@@ -52,7 +50,7 @@ class BaseCompliance(LinearSource):
         horizontal, vertical = np.diag([1.0, 1.0, 0.0]), np.diag([0.0, 0.0, 1.0])
         return Effect(base_joint_mm=MM_PER_N * np.stack([force @ horizontal, force @ vertical], axis=-1))
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         return CForm(
             """double load[6] = {0.0}, pull[6][3], t[6], weight = GRAVITY * (STRUT_KG[0] + STRUT_KG[1] + STRUT_KG[3]);
 platform_load(at, load);

@@ -10,8 +10,6 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, Motion, Owner, Texts, of_each_joint
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import Parameter
@@ -42,5 +40,5 @@ class BaseJoints(LinearSource):
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(base_joint_mm=np.eye(3 * STRUTS).reshape(STRUTS, 3, 3 * STRUTS))
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         return CForm("ALL e->base[i][k] += v[3 * i + k];", by_pose=False)

@@ -11,8 +11,6 @@ from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, 
 from dbbstation.sources.laws.weights import for_such_struts, platform_masses, strut_compliance
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
@@ -68,7 +66,7 @@ class CogShift(LinearSource):
         tension = strut_tensions(struts, Load(np.zeros_like(moment), moment))
         return stretch_mm(struts, strut_compliance(machine), tension), tension
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         return CForm(
             """double load[6] = {0.0}, t[6];
 load[3] = -WEIGHT * dot(at->r[1], v), load[4] = WEIGHT * dot(at->r[0], v);

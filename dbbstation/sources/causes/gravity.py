@@ -12,8 +12,6 @@ from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, 
 from dbbstation.sources.laws.weights import MM_PER_N, platform_masses, strut_compliance
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Compliance, Machine
 
@@ -65,7 +63,7 @@ class Gravity(LinearSource):
             return None
         return replace(strut_compliance(machine), at_1000mm_mm_per_n=MM_PER_N * float(values[0]))
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         return CForm(
             """double load[6] = {0.0}, t[6];
 platform_load(at, load);
@@ -96,8 +94,8 @@ class _Contacts(Gravity, law="contacts", law_of=Gravity):
         changes = [own * (folds - _folds(tension, 3.0 * ACROSS_N)), (own - stretch) * folds]
         return Effect(strut_mm=values[1] * np.stack(changes, axis=2))
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:
-        springs = super().c_form(machine, values, thermometers).body
+    def c_form(self, machine: Machine, values: Floats) -> CForm:
+        springs = super().c_form(machine, values).body
         return CForm(f"{springs}\nEACH e->strut[i] -= 1e-6 * v[1] * t[i] * log(1e-3 * hypot(t[i], {ACROSS_N}));")
 
 

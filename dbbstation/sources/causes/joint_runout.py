@@ -23,8 +23,6 @@ from dbbstation.sources.contract import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
@@ -100,7 +98,7 @@ class JointRunout(LinearSource):
         lengths = motion.once(self.name, machine, lambda: _per_offset(motion, machine))
         return Effect(strut_mm=of_own_strut(MM_PER_UM * lengths))
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         rest = inverse(machine.hexapod, middle(machine)).unit[0]
         return CForm(
             """EACH {

@@ -34,8 +34,6 @@ from dbbstation.sources.contract import (
 from dbbstation.sources.laws.weights import platform_masses
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
@@ -133,7 +131,7 @@ class _Shaken(ErrorSource, law="shaken", law_of=Play, extends=Play):
         by_force = 0.5 * MM_PER_UM * values[:STRUTS] * steep
         return Effect(strut_mm=np.concatenate([by_play, by_force[:, :, None]], axis=2))
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         return CForm(
             """double load[6] = {0.0}, pull[6][3], t[6], moving = GRAVITY * (STRUT_KG[3] + STRUT_KG[0] / 2.0);
 platform_load(at, load);

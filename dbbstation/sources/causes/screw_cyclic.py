@@ -23,8 +23,6 @@ from dbbstation.sources.contract import (
 from dbbstation.sources.laws.weights import screw_lead_mm
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
@@ -79,7 +77,7 @@ class ScrewCyclic(LinearSource):
         waves = [np.stack([np.sin(k * turned_rad), np.cos(k * turned_rad)], axis=-1) for k in self.harmonics]
         return np.asarray(MM_PER_UM * np.concatenate([of_own_strut(wave) for wave in waves], axis=2), dtype=np.float64)
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         body = """for (int order = 1; order <= harmonics; order++) EACH {
     double turn = 6.28318530717958647693 * order / lead * at->length[i];
     const double *wave = v + 12 * (order - 1) + 2 * i;
@@ -126,7 +124,7 @@ class _AlongTheScrew(ErrorSource, law="along the screw", law_of=ScrewCyclic, ext
             strut_mm=np.concatenate([waves * (1.0 + values[-1] * out)[:, :, None], by_growth[:, :, None]], axis=2)
         )
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:
         form = _TwoHarmonics().c_form(machine, values)
         grown = {"growth": 1e-5 * float(values[-1]), "middle": sum(machine.travel.strut_mm) / 2.0}
         return replace(form, constants={**form.constants, **grown})

@@ -18,8 +18,6 @@ from dbbstation.sources.contract import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import Parameter
@@ -55,7 +53,7 @@ class ScrewLead(LinearSource):
         travel = motion.struts(machine).length_mm - _middle_mm(machine)
         return Effect(strut_mm=of_own_strut(MM_PER_UM_M * travel))
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         body = "EACH e->strut[i] += 1e-6 * v[i] * (at->length[i] - middle);"
         return CForm(body, by_pose=False, constants={"middle": _middle_mm(machine)})
 

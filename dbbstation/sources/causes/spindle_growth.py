@@ -27,8 +27,6 @@ from dbbstation.sources.laws.temperature import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
@@ -95,6 +93,6 @@ class _ByTemperature(FollowsTemperature, cause=SpindleGrowth):
         "growth_um_k", "µm/K", 3.0, "way of the tool tip out of the spindle for each kelvin of the machine"
     )
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         body = "e->tip[2] -= 1e-3 * v[0] * warmer[thermometer[0]];"
-        return CForm(body, by_pose=False, thermometers=self.chosen(thermometers))
+        return CForm(body, by_pose=False, thermometers=self.thermometers)

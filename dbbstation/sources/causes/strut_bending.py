@@ -18,8 +18,6 @@ from dbbstation.sources.contract import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
@@ -69,7 +67,7 @@ class StrutBending(LinearSource):
         across_squared = 1.0 - (struts.unit @ DOWN) ** 2
         return Effect(strut_mm=-MM_PER_UM * (across_squared * (struts.length_mm / 1000.0) ** 5)[:, :, None])
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         return CForm(
             """EACH {
     double z = at->unit[i][2], m = at->length[i] / 1000.0;

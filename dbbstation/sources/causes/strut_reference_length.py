@@ -10,8 +10,6 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, Motion, Owner, Texts, of_each_strut
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import Parameter
@@ -38,5 +36,5 @@ class StrutReferenceLength(LinearSource):
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(strut_mm=np.eye(STRUTS))
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         return CForm("EACH e->strut[i] += v[i];", by_pose=False)

@@ -13,8 +13,6 @@ from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, 
 from dbbstation.sources.laws.weights import for_such_struts, masses_for_c, strut_compliance
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
@@ -81,7 +79,7 @@ class StrutWeight(LinearSource):
             loads.append(motor_loads(struts, tension, kilogram))
         return Effect(strut_mm=np.stack(stretch, axis=-1), load_n=np.stack(loads, axis=-1))
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:
         lengths = replace(machine.strut_masses or USUAL, strut_kg=0.0, motor_kg=0.0, screw_kg=0.0)
         given = {f"{part}_kg": float(value) for part, value in zip(_parts(machine), values, strict=True)}
         return CForm(

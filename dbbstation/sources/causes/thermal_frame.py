@@ -26,8 +26,6 @@ from dbbstation.sources.laws.temperature import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
@@ -73,6 +71,6 @@ class _ByTemperature(FollowsTemperature, cause=ThermalFrame):
         "growth_um_m_k", "µm/(m K)", STEEL_UM_M_K, "growth of the base for each kelvin that it is warmer"
     )
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         body = "ALL e->base[i][k] += 1e-6 * v[0] * warmer[thermometer[0]] * Q[i][k];"
-        return CForm(body, by_pose=False, thermometers=self.chosen(thermometers))
+        return CForm(body, by_pose=False, thermometers=self.thermometers)

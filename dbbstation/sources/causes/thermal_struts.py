@@ -28,8 +28,6 @@ from dbbstation.sources.laws.temperature import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
@@ -77,10 +75,9 @@ class _ByTemperature(FollowsTemperature, cause=ThermalStruts):
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(strut_mm=(self.warmer_k(motion) * _per_growth_mm(motion, machine))[:, :, None])
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
-        chosen = self.chosen(thermometers)
-        each = chosen if len(chosen) == STRUTS else chosen * STRUTS
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         body = "EACH e->strut[i] += 1e-6 * v[0] * warmer[thermometer[i]] * at->length[i];"
+        each = tuple(columns if len(columns) == STRUTS else columns * STRUTS for columns in self.thermometers)
         return CForm(body, by_pose=False, thermometers=each)
 
 

@@ -13,8 +13,6 @@ from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, 
 from dbbstation.sources.laws.weights import screw_lead_mm
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from numpy.typing import NDArray
 
     from dbbstation.computing.arrays import Floats
@@ -65,7 +63,7 @@ class UjointScrew(LinearSource):
         turned = np.angle(here * rest.conj())
         return Effect(strut_mm=(turned / (2.0 * np.pi))[:, :, None])
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         axes, at_rest = _axes(machine), middle(machine)
         rest = _second_axes(axes, inverse(machine.hexapod, at_rest), at_rest)[0]
         return CForm(

@@ -102,28 +102,25 @@ class FollowsTemperature(LinearSource):
 
     def _columns(self, motion: Motion) -> tuple[str, ...]:
         remedy = "give recordings with that column, or a model without this source"
-        return self.chosen(known_thermometers(motion), "not every run of the session has", remedy)
+        there = known_thermometers(motion)
+        return chosen(self.name, self.thermometers, there, "not every run of the session has", remedy)
 
-    def chosen(
-        self,
-        logged: Collection[str],
-        lacks: str = "the control has no",
-        remedy: str = "name the thermometers of the control with --thermometers, or leave the source out with --leave-out",
-    ) -> tuple[str, ...]:
-        """Return the best available thermometers.
 
-        Raises:
-            ModelError: names missing ones.
-        """
-        for columns in self.thermometers:
-            if all(name in logged for name in columns):
-                return columns
-        missing = [[f"{name}_temp_c" for name in columns if name not in logged] for columns in self.thermometers]
-        raise ModelError(
-            f"the error source {self.name} follows a thermometer, and {lacks} "
-            + ", or ".join(", ".join(names) for names in missing),
-            remedy=remedy,
-        )
+def chosen(
+    source: str, thermometers: Iterable[tuple[str, ...]], there: Collection[str], lacks: str, remedy: str
+) -> tuple[str, ...]:
+    """Return the best available thermometers of a source.
+
+    Raises:
+        ModelError: names missing ones.
+    """
+    missing = []
+    for columns in thermometers:
+        missing.append(", ".join(f"{name}_temp_c" for name in dict.fromkeys(columns) if name not in there))
+        if not missing[-1]:
+            return columns
+    what = f"the error source {source} follows a thermometer, and {lacks} {', or '.join(missing)}"
+    raise ModelError(what, remedy=remedy)
 
 
 def following_thermometers(sources: Sequence[ErrorSource], motions: Iterable[Motion]) -> tuple[ErrorSource, ...]:

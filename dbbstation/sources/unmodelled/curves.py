@@ -24,8 +24,6 @@ from dbbstation.sources.contract import (
 from dbbstation.sources.laws.weights import platform_masses
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
@@ -106,7 +104,7 @@ class UnexplainedByLength(LinearSource):
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return piecewise_linear(_points_mm(machine), motion.struts(machine).length_mm)
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         body = "EACH e->strut[i] += 1e-3 * curve(v + points * i, points, low, high, at->length[i]);"
         low, high = machine.travel.strut_mm
         return CForm(body, by_pose=False, constants={"points": POINTS, "low": low, "high": high})
@@ -139,7 +137,7 @@ class UnexplainedByForce(LinearSource):
         weight = platform_weight(motion.frames(machine), platform_masses(self.name, machine))
         return piecewise_linear(points, strut_tensions(motion.struts(machine), weight))
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         body = """double load[6] = {0.0}, t[6];
 platform_load(at, load);
 tensions(at, load, t);
@@ -200,7 +198,7 @@ class UnexplainedWave(ErrorSource):
         each = np.concatenate([waves, (-by_angle * turned_rad / period)[:, :, None]], axis=-1)
         return Effect(strut_mm=MM_PER_UM * of_own_strut(each))
 
-    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats) -> CForm:  # noqa: ARG002
         body = """EACH {
     double turn = v[3 * i + 2] ? 6.28318530717958647693 * (at->length[i] - middle) / v[3 * i + 2] : 0.0;
     e->strut[i] += 1e-3 * (v[3 * i] * sin(turn) + v[3 * i + 1] * cos(turn));

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from dbbstation.computing.arrays import place_of_largest
-from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
+from dbbstation.quality.finding import Finding, Name, found, undecided
 from dbbstation.quality.forms import Forms, form_of
 from dbbstation.quality.limits import length_quantile
 from dbbstation.quality.together import expected_um, read_um
@@ -121,15 +121,15 @@ def programs_of_all(runs: Sequence[Seen], forms: AllForms | None = None) -> Find
     limit = -float(np.log(PROBABILITY))
     stated = f"all {len(pairs)} runs together"
     if value <= 0.0:
-        return found(Name.PROGRAMS, 0.0, limit, f"{stated} are likelier as planned than mirrored or turned", "")
+        return found(Name.PROGRAMS, 0.0, limit, f"{stated} are likelier as planned than mirrored or turned")
     if value <= limit:
         why = f"{stated} are {np.exp(value):.0f} times as likely if programs ran otherwise, best {way.label}: too little to tell"
-        return Finding(Name.PROGRAMS, value, limit, "", FindingVerdict.CANNOT_TELL, why)
+        return undecided(Name.PROGRAMS, why, value, limit)
     likeliest = kept.fits(best + 1) if best < len(KEEPING) else turned.fits(best - len(KEEPING))
     if not likeliest:
         return undecided(Name.PROGRAMS, f"{stated} fit no way in which all programs may have run")
     why = f"{stated} are over a million times as likely if programs ran otherwise, best {way.label}"
-    return Finding(Name.PROGRAMS, value, limit, "", FindingVerdict.WRONG, why, f"all programs ran {way.label}")
+    return found(Name.PROGRAMS, value, limit, "", why, f"all programs ran {way.label}")
 
 
 def bar_of_all(runs: Sequence[Seen], forms: AllForms | None = None, *, by_model: bool) -> Finding:
@@ -150,11 +150,11 @@ def bar_of_all(runs: Sequence[Seen], forms: AllForms | None = None, *, by_model:
     stated = f"the bar reads {abs(by_um):.0f} µm too {'long' if by_um > 0.0 else 'short'} in all runs"
     if ratio <= limit:
         sound = "all runs together do not ask for a bar of another length"
-        return Finding(Name.BAR, max(ratio, 0.0), limit, "", FindingVerdict.GOOD, sound)
+        return found(Name.BAR, max(ratio, 0.0), limit, sound)
     if by_model:
-        return Finding(Name.BAR, ratio, limit, "", FindingVerdict.WRONG, f"{stated}, by the model", stated)
+        return found(Name.BAR, ratio, limit, "", f"{stated}, by the model", stated)
     why = f"{stated}, or the machine makes all circles {'larger' if by_um > 0.0 else 'smaller'} by as much"
-    return Finding(Name.BAR, ratio, limit, "", FindingVerdict.CANNOT_TELL, why, stated)
+    return undecided(Name.BAR, why, ratio, limit, stated)
 
 
 def _known(runs: Sequence[Seen]) -> list[tuple[Seen]]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
-from dbbstation.quality.finding import Finding, FindingVerdict, Name, times_limit
+from dbbstation.quality.finding import DO, Finding, FindingVerdict, Name, times_limit
 from dbbstation.quality.limits import LOG_ODDS_LIMIT
 
 if TYPE_CHECKING:
@@ -140,30 +140,3 @@ SHOWN_LATER = {
     _PROGRAMS: "further tests in both directions, or a model",
 }
 """Faults of this circle that later circles of the plan can show, with the measurements that show them if the plan has no circle left."""
-
-DO = {
-    Name.HELD: "the plunger sticks or the stroke ends; free it, check the plug, run the circle again",
-    Name.LOST: "check plug and cable, close other programs on the computer, run the circle again",
-    Name.FEED: "set the override on the control to 100 %, run the circle again",
-    Name.TEST: "check bore, holder, tilt and which program was started, run the circle again",
-    Name.DIRECTION: "this circle or the one before ran the wrong way round: check which program was started (G2 or G3)",
-    Name.RADIUS: "check which bar is in, radius and plane (G17) in the program and the tool length, run the circle again",
-    Name.SPIKE: "check plug, cable and earth of the gauge, run the circle again",
-    Name.BUMP: "look for chips, a cable that pulls and what touches the bar there, run the circle again",
-    Name.BORE: "check bore, holder, how the plate sits and the zero point, press the holder home, run the circle again",
-    Name.FORM: "check tilt, plane (G17) and radius in the program and how the plate sits, run the circle again",
-    Name.REPEATED: "ask the gauge less often: the rate in the instrument's file, or what the display renews; run the circle again",
-    Name.COPIED: "this is no circle of its own: look at what was imported or played back, and measure it",
-    Name.SCALE: "check the gauge at a gauge block and its counts per millimetre, then the feed-in of plan and program; run the circle again",
-    Name.CLOSURE: "tighten holder and ball, let bar and machine warm through, run the circle again",
-    Name.DRIFT: "tighten holder and ball, let bar and machine warm through, run the circle again",
-    Name.NOISE: "clean balls and cups, look for what shakes, run the circle again",
-    Name.OTHER_DIRECTION: "ball or holder moved since the other direction: press them home, run both again",
-    Name.LOCAL: "clean balls and cups, look for what touches the bar there, run both again",
-    Name.PROGRAMS: "look which way the machine turns and where it begins, check G2, G3, mirroring and turned axes (G51.1, G68); mend it and "
-    "begin a new session: every circle of this one is wrong in the same way",
-    Name.BAR: "put the bar on its calibrator, check its certificate and that no extension was changed; then every circle is to be measured again",
-    Name.REPEAT: "ball or holder moved since the run before: press them home, run it again",
-    Name.SINCE: "look what was changed at the machine since",
-}
-"""Remedies at the machine, in the shop's words."""

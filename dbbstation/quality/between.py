@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.arrays import hypot_of, median_of, norm_of, place_of_largest
-from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
+from dbbstation.quality.finding import Finding, Name, found, undecided
 from dbbstation.quality.knowledge import ACROSS, Others, Seen, across
 from dbbstation.quality.limits import FEWEST_OTHERS, SCATTERING, length_limit, length_quantile, median_length, quantile
 from dbbstation.quality.stated import apart_by, covariance_apart, drifted_um, limit_along, limit_of_length, unseen_um2
@@ -42,10 +42,9 @@ def direction(one: Seen, others: Others, expected: Expected | None = None) -> Fi
         return undecided(Name.DIRECTION, f"{stated}: what both may differ by is not known", apart)
     limit, of_mirror = limits
     if (apart > limit) is (mirror <= of_mirror):
-        wrong = f"{stated}: one of both was run the wrong way round; run both again"
-        return found(Name.DIRECTION, apart, limit, stated, wrong)
+        return found(Name.DIRECTION, apart, limit, stated)
     why = "too alike to tell" if apart <= limit else "neither of them; something else differs"
-    return Finding(Name.DIRECTION, apart, limit, "µm", FindingVerdict.CANNOT_TELL, f"{stated}: {why}")
+    return undecided(Name.DIRECTION, f"{stated}: {why}", apart, limit)
 
 
 def _across_limits(
@@ -73,15 +72,11 @@ def _by_place(one: Seen, expected: Expected | None) -> Finding | None:
     u = 1e3 * sqrt(across @ expected.covariance_mm2[:2, :2] @ across)
     is_um = 1e3 * float(across @ np.array(one.analysis.centre_mm))
     limit = quantile(np.inf) * u
-    if abs(is_um + should) <= limit and abs(is_um - should) <= limit:
-        return None
+    off_um = abs(is_um - should)
+    if (off_um <= limit) is (abs(is_um + should) <= limit):
+        return None  # both directions fit, or neither: other findings apply
     stated = f"off the axis through the start the centre is at {is_um:+.1f} µm, expected at {should:+.1f} µm"
-    if abs(is_um - should) > limit >= abs(is_um + should):
-        why = f"{stated}: the circle was run the wrong way round; run it again"
-        return Finding(Name.DIRECTION, abs(is_um - should), limit, "µm", FindingVerdict.WRONG, why)
-    if abs(is_um - should) > limit:
-        return None  # neither direction fits: other findings apply
-    return Finding(Name.DIRECTION, abs(is_um - should), limit, "µm", FindingVerdict.GOOD, stated)
+    return found(Name.DIRECTION, off_um, limit, stated)
 
 
 def other_direction(one: Seen, others: Others) -> Finding:
@@ -114,7 +109,7 @@ def _beside(
             why = f"{stated}; fewer than {FEWEST_OTHERS} other pairs, and nothing stated, to hold it against"
             return undecided(name, why, value)
         limit = limit_along(covariance, off)
-        wrong = f"{stated}, at most {limit:.1f} µm by what machine and plan state: something moved between both; run both again"
+        wrong = f"{stated}, at most {limit:.1f} µm by what machine and plan state"
         return found(name, value, limit, stated, wrong)
     lengths = [apart for apart, _ in usual]
     limit = max(length_quantile(COEFFICIENTS) * sqrt(unseen_um2(one, other)), length_limit(lengths, SCATTERING))
@@ -125,7 +120,7 @@ def _beside(
     if covariance is not None:
         more = max(median_of(sigmas) / median_length(COEFFICIENTS), 1.0) if sigmas else 1.0
         limit = min(limit, more * limit_along(covariance, off), limit_of_length(covariance))
-    wrong = f"{stated}, {np.median(lengths):.1f} µm usual in this session: something moved between both; run both again"
+    wrong = f"{stated}, {np.median(lengths):.1f} µm usual in this session"
     return found(name, value, limit, stated, wrong)
 
 
@@ -180,7 +175,7 @@ def local_difference(one: Seen, others: Others) -> Finding:
         value,
         limit,
         f"nowhere does the path leave that of run {against.run.label}: at most {place}",
-        f"the path is {place}: look for dirt between ball and cup and for what touches the bar there, and run both again",
+        f"the path is {place}",
         f"the path is {place}",
     )
 

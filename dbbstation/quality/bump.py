@@ -51,7 +51,7 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
     near = near_reversals(one.raw.theta_deg, reversals_deg)
     peaks = [peak for width in WIDTHS_DEG for peak in _peaks(one, rest, near, width)]
     if not peaks:
-        return found(Name.BUMP, 0.0, np.inf, "too few samples for stretches of 4 degrees", "")
+        return found(Name.BUMP, 0.0, np.inf, "too few samples for stretches of 4 degrees")
     worst = max(peaks, key=lambda peak: peak.ratio)
     place = f"{worst.height_um:+.1f} µm over {worst.width_deg:g} degrees at {worst.theta_deg:.0f} degrees"
     beside = ", where a strut turns round" if worst.at_reversal else ""
@@ -60,7 +60,7 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
         abs(worst.height_um),
         worst.limit_um,
         f"nothing sticks out: at most {place}{beside}",
-        f"{place}{beside}: look for chips, knocks and cables that pull, and repeat the run",
+        f"{place}{beside}",
         f"bump {place}",
     )
 

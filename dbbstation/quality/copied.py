@@ -63,7 +63,7 @@ def copied(one: Seen, others: Sequence[Seen]) -> Finding:
         100.0 * share,
         100.0 * (row - 1) / len(raw),
         "no stretch of readings stands in another run",
-        f"{stated}: one file came in twice, or a player repeats itself; measure the circle, and do not use both",
+        f"{stated}: one file came in twice, or a player repeats itself",
         f"the readings are those of run {label}",
     )
 

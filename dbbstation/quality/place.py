@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.arrays import hypot_of, norm_of
-from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
+from dbbstation.quality.finding import Finding, Name, found, undecided
 from dbbstation.quality.forms import own_um2
 from dbbstation.quality.limits import quantile
 from dbbstation.quality.stated import limit_along
@@ -35,13 +35,7 @@ def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = 
     off_um = one.mean_radial_error_um - 1e3 * expected.radial_mm
     u_um = hypot_of(1e3 * np.sqrt(expected.covariance_mm2[2, 2]), one.noise.sigma_um / np.sqrt(len(one.raw)))
     stated = f"the bar reads {one.mean_radial_error_um:+.1f} µm on average, expected {1e3 * expected.radial_mm:+.1f} µm{BY_OTHERS if by_others else ''}"
-    return found(
-        Name.RADIUS,
-        abs(off_um),
-        quantile(np.inf) * u_um,
-        stated,
-        f"{stated}: check bar length, radius of plan and program, and the tool length",
-    )
+    return found(Name.RADIUS, abs(off_um), quantile(np.inf) * u_um, stated)
 
 
 def _turns_slower(one: CircleAnalysis) -> Finding | None:
@@ -54,9 +48,7 @@ def _turns_slower(one: CircleAnalysis) -> Finding | None:
     if abs(slower_um) <= limit or abs(slower_um - mean_um) > limit or abs(mean_um) <= limit:
         return None
     stated = f"the bar reads {mean_um:+.1f} µm on average, and the circle turns slower by {slower_um:+.0f} ± {u_um:.0f} µm of its radius"
-    why = f"{stated}: check radius of plan and program, and the tool length"
-    short = f"radius {1e-3 * mean_um:+.2f} mm"
-    return Finding(Name.RADIUS, abs(mean_um), limit, "µm", FindingVerdict.WRONG, why, short)
+    return found(Name.RADIUS, abs(mean_um), limit, stated, short=f"radius {1e-3 * mean_um:+.2f} mm")
 
 
 def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = False) -> Finding:
@@ -72,13 +64,7 @@ def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = Fa
     size, limit = norm_of(off_um), limit_along(covariance, off_um)
     where = f"expected{BY_OTHERS if by_others else ''}"
     stated = f"the centre is {size:.1f} µm from where it is {where}, {off_um[0]:+.1f} in X and {off_um[1]:+.1f} in Y"
-    return found(
-        Name.BORE,
-        size,
-        limit,
-        stated,
-        f"{stated}: check bore, holder and its seat, and the ball's entry in the plan",
-    )
+    return found(Name.BORE, size, limit, stated)
 
 
 def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Finding:
@@ -95,5 +81,4 @@ def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Fi
     value, limit = norm_of(off), limit_along(covariance[np.ix_(rows, rows)], off)
     where = f"expected{BY_OTHERS if by_others else ''}"
     stated = f"{value:.1f} µm rms from where mean, centre, ellipse and triangle are {where}"
-    wrong = f"{stated}: check tilt, plane and radius of the program, and how the plate sits"
-    return found(Name.FORM, value, limit, stated, wrong)
+    return found(Name.FORM, value, limit, stated)

@@ -11,14 +11,14 @@ from scipy.special import bdtrik
 from dbbstation.circles.noise import LEAST_UM
 from dbbstation.computing.arrays import average_of, hypot_of, median_of, sum_of
 from dbbstation.quality.bump import bump
-from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
+from dbbstation.quality.finding import DO, Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.held import ALL_EQUAL, SHORTEST_S, chance_equal, equal_readings, held, moving_noise
 from dbbstation.quality.knowledge import Others, due_s
 from dbbstation.quality.limits import FEWEST_OTHERS, SHARE, joined, quantile, scale_of
 from dbbstation.quality.spike import spike
 from dbbstation.trace.cut import FEED_SIGMAS, FEED_TOLERANCE, edges_of, feed_off
 from dbbstation.trace.expected import form_columns
-from dbbstation.trace.recording import AFTER_LOSS, share_lost
+from dbbstation.trace.recording import share_lost
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,15 +49,8 @@ def repeated(raw: RawCircle) -> Finding:
         return undecided(Name.REPEATED, why, 100.0 * share)
     limit = max(HARMLESS, float(bdtrik(1.0 - SHARE, count, chance)) / count)
     stated = f"{100.0 * share:.0f} % of the readings are the same as the one before"
-    return found(
-        Name.REPEATED,
-        100.0 * share,
-        100.0 * limit,
-        stated,
-        f"{stated}: the gauge is asked more often than it has new readings, or rows come twice; set the rate to what it renews, and "
-        "repeat the run",
-        f"{100.0 * share:.0f} % of the readings come more than once",
-    )
+    again = f"{100.0 * share:.0f} % of the readings come more than once"
+    return found(Name.REPEATED, 100.0 * share, 100.0 * limit, stated, short=again)
 
 
 def lost_samples(one: Seen) -> Finding:
@@ -65,7 +58,7 @@ def lost_samples(one: Seen) -> Finding:
     lost, kept = one.lost
     percent = 100.0 * lost / max(lost + kept, 1)
     stated = share_lost(lost, kept, one.unusable) if lost else "no sample is missing on the turn"
-    return found(Name.LOST, percent, one.run.largest_loss_percent, stated, f"{stated}; {AFTER_LOSS}")
+    return found(Name.LOST, percent, one.run.largest_loss_percent, stated)
 
 
 def noise(one: CircleAnalysis, others: Others) -> Finding:
@@ -85,15 +78,9 @@ def noise(one: CircleAnalysis, others: Others) -> Finding:
     if log_limit > LARGEST_LOG:
         why = f"{value:.2f} µm; the noise of the other runs differs too much to hold it against"
         return undecided(Name.NOISE, why, value)
-    limit = float(np.exp(log_limit))
-    return found(
-        Name.NOISE,
-        value,
-        limit,
-        f"{value:.2f} µm per reading",
-        f"{value:.2f} µm per reading, {np.exp(middle):.2f} µm in the other runs: look after balls, cable and what shakes the "
-        "machine, and repeat the run",
-    )
+    stated = f"{value:.2f} µm per reading"
+    wrong = f"{stated}, {np.exp(middle):.2f} µm in the other runs"
+    return found(Name.NOISE, value, float(np.exp(log_limit)), stated, wrong)
 
 
 LARGEST_LOG = float(np.log(1e4))
@@ -106,15 +93,8 @@ def closure(one: CircleAnalysis, others: Others, expected: Expected | None = Non
         return undecided(Name.CLOSURE, "too few samples, at the ends of the turn or to separate noise from form")
     u = one.closure.u_um
     limit = max(_beyond(u, one.noise.freedom, others.closure_um), _left_open_um(expected))
-    size = abs(one.closure.height_um)
     stated = f"the turn ends {one.closure.height_um:+.2f} µm off its beginning"
-    return found(
-        Name.CLOSURE,
-        size,
-        limit,
-        stated,
-        f"{stated}: something moved or warmed during the run, or the angles are wrong; repeat it",
-    )
+    return found(Name.CLOSURE, abs(one.closure.height_um), limit, stated)
 
 
 def drift(one: CircleAnalysis, others: Others, expected: Expected | None = None) -> Finding:
@@ -128,13 +108,7 @@ def drift(one: CircleAnalysis, others: Others, expected: Expected | None = None)
     limit = _beyond(hypot_of(u, _by_feed_um(one)), one.noise.freedom, others.drift_um)
     limit = max(limit, _left_open_um(expected))
     stated = f"the bar reads {passes.mean_um:+.2f} µm more after one turn of {passes.turn_s:.0f} s"
-    return found(
-        Name.DRIFT,
-        abs(passes.mean_um),
-        limit,
-        stated,
-        f"{stated}, the same place passed twice: let bar and machine warm through, tighten the holder, and repeat the run",
-    )
+    return found(Name.DRIFT, abs(passes.mean_um), limit, stated)
 
 
 def _left_open_um(expected: Expected | None) -> float:
@@ -182,11 +156,10 @@ def feed(one: Seen, others: Others) -> Finding:
     programmed = one.run.circle.feed_mm_min
     limit = max(FEED_TOLERANCE * programmed, FEED_SIGMAS * u)
     stated = f"the overlap shows {shown:.1f} ± {u:.1f} mm/min, programmed are {programmed:g}"
-    short = f"feed {shown:.0f} of {programmed:g} mm/min"
     off = limit * feed_off(
         one.feed_mm_min, one.run.recording, one.run.circle, edges_of(one.run.recording, one.run.circle)
     )
-    return found(Name.FEED, off, limit, stated, f"{stated}: {AFTER_OTHER_FEED}", short)
+    return found(Name.FEED, off, limit, stated, short=f"feed {shown:.0f} of {programmed:g} mm/min")
 
 
 def _feed_by_duration(one: Seen, others: Others) -> Finding:
@@ -207,15 +180,8 @@ def _feed_by_duration(one: Seen, others: Others) -> Finding:
     stated = (
         f"feed-in to feed-out took {due + one.longer_s:.1f} s, {due + usual:.1f} s at the most at {programmed:g} mm/min"
     )
-    return Finding(
-        Name.FEED,
-        programmed - shown,
-        programmed * limit / (due + limit),
-        "mm/min",
-        FindingVerdict.WRONG,
-        f"{stated}: {AFTER_OTHER_FEED}",
-        f"feed {shown:.0f} of {programmed:g} mm/min on average",
-    )
+    short = f"feed {shown:.0f} of {programmed:g} mm/min on average"
+    return found(Name.FEED, programmed - shown, programmed * limit / (due + limit), stated, short=short)
 
 
 LONGEST_STOP_S = 4.0
@@ -224,11 +190,6 @@ corner; no known program waits two seconds."""
 
 UNEVEN_STOP_S = 0.6
 """Possible variation of the total stop between runs [s]: none, or 0.3 s at each corner."""
-
-AFTER_OTHER_FEED = (
-    "set the override on the control to 100 % and run it again; if this feed is intended, state it in the plan"
-)
-"""Remedy for a wrong feed."""
 
 
 def no_circle(one: Seen) -> tuple[Finding, ...]:
@@ -278,7 +239,7 @@ def _slower(one: Seen, others: Others) -> Finding | None:
     stated = f"feed-in to feed-out took {due + one.longer_s:.1f} s, {due + usual:.1f} s were due, and the turn closes at {short}"
     limit = circle.feed_mm_min * LEAST_SLOWER
     off = circle.feed_mm_min - shown
-    return Finding(Name.FEED, off, limit, "mm/min", FindingVerdict.WRONG, f"{stated}: {AFTER_OTHER_FEED}", short)
+    return Finding(Name.FEED, off, limit, "mm/min", FindingVerdict.WRONG, f"{stated}: {DO[Name.FEED]}", short)
 
 
 LEAST_SLOWER = 0.08
@@ -309,14 +270,8 @@ def scale(one: Seen, others: Others) -> Finding:
             size, limit, counted = least, together, both_um
     percent = 100.0 * counted / feed_in_um
     stated = f"feed-in and feed-out read {percent:+.2f} % more than their {one.run.circle.feed_in_mm:g} mm"
-    return found(
-        Name.SCALE,
-        100.0 * size / feed_in_um,
-        100.0 * limit / feed_in_um,
-        stated,
-        f"{stated}: check what the gauge counts per millimetre, at a gauge block, and the feed-in of plan and program",
-        f"the gauge counts {percent:+.1f} % too much",
-    )
+    short = f"the gauge counts {percent:+.1f} % too much"
+    return found(Name.SCALE, 100.0 * size / feed_in_um, 100.0 * limit / feed_in_um, stated, short=short)
 
 
 def _excess_um(one: Seen) -> float:

@@ -77,7 +77,7 @@ def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
         height_um,
         limit_um,
         f"no reading leaves its neighbours: at most {place}",
-        f"a reading stands {place}{many}: G holds it; look after plug, cable and earth of the gauge, and repeat the run",
+        f"a reading stands {place}{many}, and G holds it",
         f"spike {place}",
     )
 

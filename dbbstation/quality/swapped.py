@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import logsumexp
 
-from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
+from dbbstation.quality.finding import Finding, Name, found, undecided
 from dbbstation.quality.forms import SIZES
 from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN, length_quantile
 from dbbstation.quality.stated import drifted_um, unseen_um2
@@ -52,15 +52,9 @@ def of_its_test(one: Seen, both: Together | None) -> Finding:
     own = f"{one.run.test} {one.run.circle.direction}"
     better = f"the readings are {times} times as likely those of {nearest.label} as those of {own}"
     if 0.0 < value <= limit:
-        return Finding(Name.TEST, value, limit, "", FindingVerdict.CANNOT_TELL, f"{better}: too alike to tell")
+        return undecided(Name.TEST, f"{better}: too alike to tell", value, limit)
     sound = f"none of {len(every)} other circles of the plan explains the readings better"
-    return found(
-        Name.TEST,
-        value,
-        limit,
-        sound,
-        f"{better}: check bore, holder, tilt, start and program of both, and run it again",
-    )
+    return found(Name.TEST, value, limit, sound, better)
 
 
 def _measured(one: Seen, both: Together | None) -> Iterator[_Explained]:

@@ -11,6 +11,7 @@ from dbbstation.cli.output import echo, log_said
 from dbbstation.cli.progress import COUNTED, ProgressBar
 from dbbstation.facts import of_facts
 from dbbstation.results.sessions import CompletedRun, MeasuredSession, RecordedRun
+from dbbstation.service.board import message_of
 from dbbstation.service.session_notes import shop_degc
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, AddNote, GoTo, Pause, Quit, Reject, Repeat, Resume, Skip, Start
@@ -204,38 +205,24 @@ def _temperature(text: str) -> AddNote | None:
 _WITH_TEXT: dict[str, Callable[[str], Command | None]] = {"g": GoTo, "a": Accept, "n": AddNote, "t": _temperature}
 
 
-def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: C901, PLR0911 - a line per event, nothing nested
+def _lines(event: events.Event, centre: str) -> list[str]:
     match event:
         case events.RunAnnounced():
             head = f"{event.number} of {event.count}: test {event.run.test} {event.run.direction}"
             head += f" (repeat {event.run.repeat})" if event.run.repeat > 1 else ""
             return [head, *(f"  - {step}" for step in event.instructions)]
-        case events.RunDoubted():
-            return _of(event.run, f"doubted: {event.finding.text}")
-        case events.Noted():
-            degc = "" if event.ambient_temp_c is None else f"{event.ambient_temp_c:g} °C"
-            return [f"  noted: {event.text or degc}"]
         case events.SessionFinished() if event.missing:
             return [f"left out, measure them another time: {', '.join(event.missing)}"]
         case events.SessionStopped() | events.Fault():
             run = event.interrupted
             return [] if run is None else [f"  {run.label}: interrupted, kept as far as it came"]
-        case events.CommandRefused():
-            return [f"  {event.why}"]
         case events.RunStarted(run=run):
             return _of(run, "recording")
-        case events.RunRestored(run=run):
-            return _of(run, "recorded before, it waits for its verdict")
-        case events.RunAccepted(run=run, beside=beside):
-            return _of(run, "accepted" if beside is None else f"accepted; {beside.label} counts too")
-        case events.RunRejected(run=run, reason=reason):
-            return _of(run, f"does not count, kept ({reason})")
-        case events.RunLate(run=run, problem=problem) | events.FeedInMissed(run=run, problem=problem):
-            return _of(run, problem)
         case events.RunCompleted(run=run):
             wrong = (f"{finding.name} wrong: {finding.text}" for finding in event.wrong)
             return _of(run, _word_of(event), _measured(event, centre), *wrong)
-    return []
+    told = message_of(event)
+    return [] if told is None else [f"  {told.text}"]
 
 
 def _of(run: events.RunId, *texts: str) -> list[str]:

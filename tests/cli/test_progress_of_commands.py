@@ -171,7 +171,7 @@ def test_measuring_shows_one_bar_which_leaves_with_the_circle(monkeypatch, termi
 
     seen = watched(work, monkeypatch, terminal)
     reads_well(seen)
-    assert seen.last == ["  a-ccw-1: accepted"] * 3
+    assert seen.last == ["  a-ccw-1 accepted"] * 3
     shown = [bar for screen in seen.screens for bar in bars(screen)]
     assert bool(shown) == (terminal != "dumb")
     assert {(bar[1], bar[4]) for bar in shown} <= {("recording", "400")}

@@ -13,7 +13,7 @@ import numpy as np
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.history.order import by_time
 from dbbstation.history.run_length import chart_for
-from dbbstation.history.watch import TrendVerdict, watch
+from dbbstation.history.watch import not_watched, watch
 from dbbstation.plan.tolerance import CircleFigure
 
 if TYPE_CHECKING:
@@ -87,13 +87,8 @@ class Trend:
     values: Floats
     u: Floats
     limit: float | None
-    watched: Watched | None
+    watched: Watched
     why_not: str = ""
-
-    @property
-    def verdict(self) -> TrendVerdict:
-        """Return the verdict on its history."""
-        return TrendVerdict.CANNOT_TELL if self.watched is None else self.watched.verdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,10 +155,11 @@ def _history(
     labels = _labels(list(series))
     trends = []
     for subject, (at, values, u) in numbers.items():
-        looked = None if reasons[subject] or chart is None else watch(values, u, chart, asked.coverage_factor)
+        unseen = not_watched(len(at))
+        looked = unseen if reasons[subject] or chart is None else watch(values, u, chart, asked.coverage_factor)
         limit = _limit(subject, asked.tolerances)
         trends.append(Trend(subject, labels[subject], at, values, u, limit, looked, reasons[subject]))
-    looked_at = sum(trend.watched.watched for trend in trends if trend.watched is not None)
+    looked_at = sum(trend.watched.watched for trend in trends)
     return MachineHistory(
         machine, tuple(sessions), tuple(trends), chart, asked.false_alarms * looked_at / count if count else 0.0
     )

@@ -81,7 +81,7 @@ class Watched:
         level: mean of all values between two changes.
         u_level: standard uncertainty by stated uncertainties or scatter, whichever is larger.
         scatter: scatter since the last change, in stated uncertainties; NaN for too few values.
-        lacking: values needed before the next comparison: one just after a change, else zero.
+        lacking: values needed before the next comparison: one just after a change, else zero; None if not watched.
         by_stated: whether the last comparison uses stated uncertainties alone.
     """
 
@@ -92,7 +92,7 @@ class Watched:
     level: Floats
     u_level: Floats
     scatter: float
-    lacking: int
+    lacking: int | None
     by_stated: bool = False
 
     @property
@@ -107,6 +107,12 @@ class Watched:
             return TrendVerdict.CANNOT_TELL
         found = {event.verdict for event in self.events}
         return next((v for v in (TrendVerdict.CHANGED, TrendVerdict.STANDS_OUT) if v in found), TrendVerdict.STEADY)
+
+
+def not_watched(count: int) -> Watched:
+    """Return the result for a quantity that no chart watches."""
+    nothing = np.full(count, np.nan)
+    return Watched((), nothing, nothing, nothing, nothing, nothing, np.nan, None)
 
 
 def watch(

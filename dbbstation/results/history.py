@@ -236,10 +236,10 @@ def _machine(one: MachineHistory, coverage_factor: float) -> MachineHistoryResul
     return MachineHistoryResult(
         machine=one.machine,
         sessions=tuple(sessions),
-        watched_quantities=sum(trend.watched is not None for trend in one.trends),
+        watched_quantities=sum(not trend.why_not for trend in one.trends),
         chart=None if chart is None else WatchLimits(chart.reference, chart.interval, chart.single),
         false_alarms_expected=one.expected,
-        verdicts={str(verdict): count for verdict, count in sorted(Counter(t.verdict for t in one.trends).items())},
+        verdicts=dict(sorted(Counter(str(trend.watched.verdict) for trend in one.trends).items())),
         changes=tuple(_changes(one, sessions)),
         quantities=tuple(_quantity(trend, sessions, coverage_factor) for trend in one.trends),
     )
@@ -253,7 +253,7 @@ def _session(session: SessionFigures) -> HistorySession:
 def _changes(one: MachineHistory, sessions: Sequence[HistorySession]) -> Iterator[HistoryChange]:
     found: dict[tuple[int, int, TrendVerdict], list[tuple[Trend, TrendEvent[int]]]] = {}
     for trend in one.trends:
-        for event in () if trend.watched is None else trend.watched.events:
+        for event in trend.watched.events:
             key = (int(trend.at[event.found]), int(trend.at[event.since]), event.verdict)
             found.setdefault(key, []).append((trend, event))
     for (shown, since, verdict), events in sorted(found.items()):
@@ -294,28 +294,24 @@ def _quantity(trend: Trend, sessions: Sequence[HistorySession], coverage_factor:
         quantity=trend.label,
         test=trend.subject.test or None,
         direction=trend.subject.direction or None,
-        verdict=str(trend.verdict),
+        verdict=str(watched.verdict),
         why_not=trend.why_not or None,
         limit=limit,
         conformity=None if limit is None else str(conformity(last, limit, coverage_factor)),
         exceeded_sessions=None if limit is None else int(np.sum(beyond > limit)),
-        level=None if watched is None else finite(float(watched.level[-1])),
-        u_level=None if watched is None else finite(float(watched.u_level[-1])),
-        scatter_in_u=None if watched is None else finite(watched.scatter),
-        sessions_lacking=None if watched is None else watched.lacking,
-        decided_by=None if watched is None or not watched.watched else DECIDED_BY[watched.by_stated],
-        watched_sessions=0 if watched is None else watched.watched,
-        events=()
-        if watched is None
-        else tuple(event.named([sessions[at].name for at in trend.at]) for event in watched.events),
+        level=finite(float(watched.level[-1])),
+        u_level=finite(float(watched.u_level[-1])),
+        scatter_in_u=finite(watched.scatter),
+        sessions_lacking=watched.lacking,
+        decided_by=DECIDED_BY[watched.by_stated] if watched.watched else None,
+        watched_sessions=watched.watched,
+        events=tuple(event.named([sessions[at].name for at in trend.at]) for event in watched.events),
         values=tuple(_values(trend, sessions)),
     )
 
 
 def _values(trend: Trend, sessions: Sequence[HistorySession]) -> Iterator[HistoryValue]:
     watched = trend.watched
-    unknown = np.full(len(trend.at), np.nan)
-    charted = [unknown] * 4 if watched is None else [watched.level, watched.z, watched.high, watched.low]
-    columns = (trend.at, trend.values, trend.u, *charted)
+    columns = (trend.at, trend.values, trend.u, watched.level, watched.z, watched.high, watched.low)
     for k, value, *others in zip(*(column.tolist() for column in columns), strict=True):
         yield HistoryValue(sessions[k].name, sessions[k].started, value, *map(finite, others))

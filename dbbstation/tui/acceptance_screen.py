@@ -132,18 +132,17 @@ class AcceptanceScreen(RowScreen):
         self._after.look()
         self._draw()
 
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        if action == "former":
-            return self._after.busy is None and self._found is not None and bool(self._found.formers)
-        if action == "cancel":
-            return self._after.busy is SessionTask.ACCEPTANCE
-        return super().check_action(action, parameters)
+    def offers_former(self) -> bool:
+        return self._after.busy is None and self._found is not None and bool(self._found.formers)
+
+    def offers_cancel(self) -> bool:
+        return self._after.busy is SessionTask.ACCEPTANCE
 
     def chosen_another(self) -> None:
         self._draw()
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
-        if self._after.former is None and self.check_action("former", ()):
+        if self._after.former is None and self.offers_former():
             self._accept(self.at)
 
     def action_former(self) -> None:

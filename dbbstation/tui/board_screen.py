@@ -87,35 +87,33 @@ class RunScreen(BoardScreen):
         self._show = shown
         self._clock = clock
 
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        if action == "tell":
-            return type(COMMANDS[str(parameters[0])]) in self.desk.board.allowed
-        if action == "accept":
-            return Accept in self.desk.board.allowed
-        if action == "next":
-            return self.desk.board.state in VERDICT and not self._undecided
-        if action == "undecided":
-            return self._undecided
-        if action == "alone":
-            completed = self.desk.board.completed
-            beside = None if completed is None else completed.counts_beside
-            return Accept in self.desk.board.allowed and beside is not None and not self._faulty
-        return super().check_action(action, parameters)
+    def offers_tell(self, name: str) -> bool:
+        return type(COMMANDS[name]) in self.desk.board.allowed
+
+    def offers_accept(self) -> bool:
+        return Accept in self.desk.board.allowed
+
+    def offers_next(self) -> bool:
+        return self.desk.board.state in VERDICT and not self.offers_undecided()
+
+    def offers_alone(self) -> bool:
+        completed = self.desk.board.completed
+        beside = None if completed is None else completed.counts_beside
+        return Accept in self.desk.board.allowed and beside is not None and not self._faulty
 
     @property
     def _faulty(self) -> bool:
         completed = self.desk.board.completed
         return completed is None or completed.answer.word is Advice.REPEAT
 
-    @property
-    def _undecided(self) -> bool:
+    def offers_undecided(self) -> bool:
         board = self.desk.board
         if Accept not in board.allowed or board.completed is None or board.doubted:
             return False
         return board.completed.answer.word is Advice.CANNOT_TELL
 
     def keys(self) -> object:
-        return super().keys(), self._undecided, bool(self.desk.board.doubted)
+        return super().keys(), self.offers_undecided(), bool(self.desk.board.doubted)
 
     def action_next(self) -> None:
         """Accept or repeat the run as its verdict suggests, then return to runs in doubt."""

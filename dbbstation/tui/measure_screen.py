@@ -118,12 +118,11 @@ class MeasureScreen(RunScreen):
     def keys(self) -> object:
         return super().keys(), len(self.desk.board.views)
 
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        if action == "view":
-            return len(self.desk.board.views) > 1
-        if action == "to_results":
-            return self.desk.board.state is State.FINISHED and bool(self.app.check_action("results", ()))
-        return super().check_action(action, parameters)
+    def offers_view(self) -> bool:
+        return len(self.desk.board.views) > 1
+
+    def offers_to_results(self) -> bool:
+        return self.desk.board.state is State.FINISHED and bool(self.app.check_action("results", ()))
 
     async def action_to_results(self) -> None:
         await self.run_action("app.results")

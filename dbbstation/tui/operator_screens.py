@@ -180,10 +180,11 @@ class OperateScreen(RunScreen):
         self.set_class(self.desk.board.state in {None, State.BETWEEN, State.ANNOUNCED, State.PAUSED}, "-set-up")
         super().draw()
 
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        if action == "accept" or (action == "tell" and str(parameters[0]) in {"reject", "skip", "accept"}):
-            return False
-        return super().check_action(action, parameters)
+    def offers_accept(self) -> bool:
+        return False
+
+    def offers_tell(self, name: str) -> bool:
+        return name not in {"reject", "skip", "accept"} and super().offers_tell(name)
 
 
 class AnswerScreen(ExplainedScreen):
@@ -217,10 +218,8 @@ class AnswerScreen(ExplainedScreen):
             self._draw()
             self.refresh_bindings()
 
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        if action == "read":
-            return self._answered is not None
-        return super().check_action(action, parameters)
+    def offers_read(self) -> bool:
+        return self._answered is not None
 
     def action_read(self) -> None:
         self._back()

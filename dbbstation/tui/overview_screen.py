@@ -72,22 +72,21 @@ class OverviewScreen(BoardScreen):
         verdict = self.desk.board.verdicts.get(run.run.label) if run else None
         return super().keys(), self.choice.at, self.choice.way, verdict, len(self._runs())
 
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        board = self.desk.board
-        if action == "go_to":
-            return GoTo in board.allowed and bool(self.choice.tests)
-        if action == "earlier":
-            return len(self._runs()) > 1
-        if action == "judge":
-            run, accepted = self._run(), bool(parameters[0])
-            return (
-                self._judging
-                and (Judge in board.allowed or board.state is State.FINISHED)
-                and run is not None
-                and (run.figures is not None or not accepted)
-                and board.verdicts.get(run.run.label) is _VERDICT_BEFORE[accepted]
-            )
-        return super().check_action(action, parameters)
+    def offers_go_to(self) -> bool:
+        return GoTo in self.desk.board.allowed and bool(self.choice.tests)
+
+    def offers_earlier(self) -> bool:
+        return len(self._runs()) > 1
+
+    def offers_judge(self, accepted: bool) -> bool:  # noqa: FBT001 - as the key has it
+        board, run = self.desk.board, self._run()
+        return (
+            self._judging
+            and (Judge in board.allowed or board.state is State.FINISHED)
+            and run is not None
+            and (run.figures is not None or not accepted)
+            and board.verdicts.get(run.run.label) is _VERDICT_BEFORE[accepted]
+        )
 
     def action_choose(self, steps: int) -> None:
         self.choice.back = 0

@@ -71,10 +71,8 @@ class PrepareScreen(FrontScreen):
         if self._line is not None:
             self._tell()
 
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        if action == "programs":
-            return not (self._goes_on and self._prepared.job.programs)
-        return super().check_action(action, parameters)
+    def offers_programs(self) -> bool:
+        return not (self._goes_on and self._prepared.job.programs)
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
         self._confirmed ^= {list(self._list)[self.at]}

@@ -143,15 +143,14 @@ class ResultsScreen(RowScreen):
             self._go_to(self._after.busy)
         self._draw()
 
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        match action:
-            case "step":
-                return self._after.can(SessionTask(str(parameters[0])))
-            case "every":
-                return self._after.busy is None
-            case "cancel":
-                return self._after.busy is not None
-        return super().check_action(action, parameters)
+    def offers_step(self, name: str) -> bool:
+        return self._after.can(SessionTask(name))
+
+    def offers_every(self) -> bool:
+        return self._after.busy is None
+
+    def offers_cancel(self) -> bool:
+        return self._after.busy is not None
 
     def chosen_another(self) -> None:
         self._draw()

@@ -39,6 +39,11 @@ class ExplainedScreen(Screen[None]):
             self._keys_by = now
             self.refresh_bindings()
 
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Ask the method `offers_ACTION` whether the action is possible now, if there is one."""
+        offers: Callable[..., bool] | None = getattr(self, f"offers_{action}", None)
+        return super().check_action(action, parameters) if offers is None else offers(*parameters)
+
     def look(self) -> None:
         """Show changes from other parts of the program."""
 

@@ -53,10 +53,10 @@ class StartScreen(FrontScreen):
     def chosen(self) -> SessionLine | None:
         return self._sessions[self.at] if self._sessions else None
 
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        if action in {"line", "results"}:
-            return self.chosen is not None and not self.chosen.problem
-        return super().check_action(action, parameters)
+    def offers_line(self) -> bool:
+        return self.chosen is not None and not self.chosen.problem
+
+    offers_results = offers_line
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
         line = self.chosen

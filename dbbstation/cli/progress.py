@@ -18,10 +18,11 @@ from dbbstation.cli.output import say
 from dbbstation.text.written import on_one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
     from rich.progress import Progress
 
+    from dbbstation.computing.counted import Counted
     from dbbstation.tasks.telling import Progress as Tell
 
 _LOG = logging.getLogger(__name__)
@@ -127,7 +128,7 @@ class Compiling:
 
 
 @contextmanager
-def count_bar(label: str) -> Iterator[Callable[[int, int], None]]:
+def count_bar(label: str) -> Iterator[Counted]:
     """Show a bar; yield a callback for done and total.
 
     The bar appears after a moment.

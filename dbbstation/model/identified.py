@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dbbstation.computing.arrays import place_of_largest
+from dbbstation.computing.counted import uncounted
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import KinematicsError
 from dbbstation.facts.value import finite
@@ -17,12 +18,14 @@ from dbbstation.model.machine_model import by_parameters
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import ArrayLike
 
     from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.counted import Counted
     from dbbstation.model.machine_model import MachineModel
+    from dbbstation.sources.contract import Parameter
 
 
 Row = tuple[str, str, str]
@@ -82,6 +85,13 @@ class IdentifiedModel:
         """
         variance = np.diag(self.covariance) - (0.0 if self.formula_variance is None else self.formula_variance)
         return dict(zip(self.covariance_rows, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
+
+    def of_machine(self, u: Mapping[Row, float | None]) -> Iterator[tuple[str, Parameter, float, float | None]]:
+        """Yield source, parameter, value and uncertainty of each of the machine's parameters."""
+        for fitted in self.model.of_the_machine().sources:
+            for parameter, value in zip(fitted.source.parameters(self.model.machine), fitted.values, strict=True):
+                known = u.get((fitted.source.name, fitted.shared, parameter.name))
+                yield fitted.source.name, parameter, float(value), known
 
     @property
     def why_unknown(self) -> str:
@@ -178,7 +188,7 @@ POSES_AT_ONCE = 5_000
 def predicted_poses(
     identified: IdentifiedModel,
     poses: ArrayLike,
-    progress: Callable[[int, int], None] = lambda _done, _of: None,
+    progress: Counted = uncounted,
 ) -> tuple[Floats, Floats]:
     """Return actual poses, shape (n, 6) [mm, deg], of single commands, and standard uncertainties of X, Y, Z, shape (n, 3) [mm]; NaN if unknown.
 

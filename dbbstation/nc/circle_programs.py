@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.counted import uncounted
 from dbbstation.errors import StationError
 from dbbstation.machine.geometry import check_model_is_of
 from dbbstation.nc.circle_program import CLEARANCE_MM, STEP_DEG, chord_error_mm, circle_toolpath
@@ -18,8 +19,9 @@ from dbbstation.nc.reach import check_feeds, check_reach
 from dbbstation.plan.plan import chosen_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
+    from dbbstation.computing.counted import Counted
     from dbbstation.machine.geometry import Machine
     from dbbstation.nc.dialect import Dialect
     from dbbstation.nc.export import Inverse, Program
@@ -38,7 +40,7 @@ def circle_programs(
     step_deg: float = STEP_DEG,
     chord_mm: float = CIRCLE_CHORD_MM,
     clearance_mm: float | None = CLEARANCE_MM,
-    progress: Callable[[int, int], None] = lambda _done, _of: None,
+    progress: Counted = uncounted,
 ) -> list[Program]:
     """Return the programs of all runs, named TEST-DIRECTION with the dialect's extension.
 
@@ -81,7 +83,7 @@ def dry_run(
     tests: Sequence[str] = (),
     step_deg: float = STEP_DEG,
     clearance_mm: float | None = CLEARANCE_MM,
-    progress: Callable[[int, int], None] = lambda _done, _of: None,
+    progress: Counted = uncounted,
 ) -> tuple[int, list[StationError]]:
     """Check the nominal programs of all runs of a plan without writing them."""
     runs = plan.runs(tests)

@@ -133,12 +133,13 @@ class SessionRuns:
         both = together(one, self._runs if one in self._runs else [*self._runs, one], self._forms.planned)
         by_others = expected_beside(both)
         expected = by_others or one.run.expected
+        by = "" if by_others is None else " by the other tests"
         return [
             direction(one, others, expected),
             of_its_test(one, both),
-            radius(analysis, expected, by_others=by_others is not None),
-            bore(analysis, expected, by_others=by_others is not None),
-            form(one, expected, by_others=by_others is not None),
+            radius(analysis, expected, by),
+            bore(analysis, expected, by),
+            form(one, expected, by),
             scale(one, others),
             other_direction(one, others),
             repeat(one, others),

@@ -19,11 +19,8 @@ if TYPE_CHECKING:
     from dbbstation.quality.knowledge import Seen
     from dbbstation.trace.expected import Expected
 
-BY_OTHERS = " by the other tests"
-"""Words in texts for an expectation from other tests of the session."""
 
-
-def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = False) -> Finding:
+def radius(one: CircleAnalysis, expected: Expected | None, by: str = "") -> Finding:
     """Judge the mean reading.
 
     At the programmed feed a larger circle takes longer. If the overlap shows this, no expectation is needed.
@@ -34,7 +31,9 @@ def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = 
         return undecided(Name.RADIUS, "no expected radius is known")
     off_um = one.mean_radial_error_um - 1e3 * expected.radial_mm
     u_um = hypot_of(1e3 * np.sqrt(expected.covariance_mm2[2, 2]), one.noise.sigma_um / np.sqrt(len(one.raw)))
-    stated = f"the bar reads {one.mean_radial_error_um:+.1f} µm on average, expected {1e3 * expected.radial_mm:+.1f} µm{BY_OTHERS if by_others else ''}"
+    stated = (
+        f"the bar reads {one.mean_radial_error_um:+.1f} µm on average, expected {1e3 * expected.radial_mm:+.1f} µm{by}"
+    )
     return found(Name.RADIUS, abs(off_um), quantile(np.inf) * u_um, stated)
 
 
@@ -51,8 +50,8 @@ def _turns_slower(one: CircleAnalysis) -> Finding | None:
     return found(Name.RADIUS, abs(mean_um), limit, stated, short=f"radius {1e-3 * mean_um:+.2f} mm")
 
 
-def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = False) -> Finding:
-    """Judge the centre; arguments as of `radius`."""
+def bore(one: CircleAnalysis, expected: Expected | None, by: str = "") -> Finding:
+    """Judge the centre."""
     if expected is None:
         return undecided(Name.BORE, "no expected centre is known")
     if not expected.place_known:
@@ -62,12 +61,13 @@ def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = Fa
     covariance = 1e6 * expected.covariance_mm2[:2, :2] + noise * np.eye(2)
     # The limit is the sound centre's ellipse, in the direction of this deviation.
     size, limit = norm_of(off_um), limit_along(covariance, off_um)
-    where = f"expected{BY_OTHERS if by_others else ''}"
-    stated = f"the centre is {size:.1f} µm from where it is {where}, {off_um[0]:+.1f} in X and {off_um[1]:+.1f} in Y"
+    stated = (
+        f"the centre is {size:.1f} µm from where it is expected{by}, {off_um[0]:+.1f} in X and {off_um[1]:+.1f} in Y"
+    )
     return found(Name.BORE, size, limit, stated)
 
 
-def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Finding:
+def form(one: Seen, expected: Expected | None, by: str = "") -> Finding:
     """Judge mean, centre, ellipse and triangle together."""
     if expected is None:
         return undecided(Name.FORM, "no expected form is known")
@@ -79,6 +79,5 @@ def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Fi
     rows = list(range(len(expected.form_um))) if expected.place_known else [0, *HIGHER]
     off = (one.coefficients_um - expected.form_um)[rows]
     value, limit = norm_of(off), limit_along(covariance[np.ix_(rows, rows)], off)
-    where = f"expected{BY_OTHERS if by_others else ''}"
-    stated = f"{value:.1f} µm rms from where mean, centre, ellipse and triangle are {where}"
+    stated = f"{value:.1f} µm rms from where mean, centre, ellipse and triangle are expected{by}"
     return found(Name.FORM, value, limit, stated)

@@ -21,7 +21,7 @@ from dbbstation.report.sheet import MARGIN_IN, Box, Cell, Key, Sheet
 from dbbstation.results.frame import OnePanel
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -142,38 +142,44 @@ def draw_circles(plotted: Plotted) -> Figure:
     """
     panels = plotted.panels()
     match plotted.kind:
-        case PlotKind.POLAR:
-            return _grid(plotted, panels, draw_polar, most_columns=4, height_over_width=1.0)
-        case PlotKind.DEVIATION:
-            return _grid(plotted, panels, draw_deviation, most_columns=2, height_over_width=0.5)
-        case PlotKind.SPECTRUM:
-            return _grid(plotted, panels, draw_spectrum, most_columns=2, height_over_width=0.55)
         case PlotKind.MAP:
             return _map(plotted)
         case PlotKind.COMPARE:
             return _compare(plotted, panels)
+    return _grid(plotted, panels)
 
 
-def _grid(
-    plotted: Plotted,
-    panels: Sequence[PlotPanel],
-    draw: Callable[[Sheet, Box, str, Sequence[Drawn]], None],
-    most_columns: int,
-    height_over_width: float,
-) -> Figure:
-    columns = min(most_columns, len(panels))
-    rows = -(-len(panels) // columns)
-    width_in = NARROW_IN if len(panels) == 1 else WIDE_IN
-    each = (width_in - 2.0 * MARGIN_IN - (columns - 1) * _GAP_IN) / columns
-    height = height_over_width * each + CAPTION_IN
-    sheet = _sheet(plotted, width_in, rows * height + (rows - 1) * _GAP_IN, panels)
-    for k, panel in enumerate(panels):
-        row, column = divmod(k, columns)
-        left = MARGIN_IN + column * (each + _GAP_IN)
-        bottom = sheet.top_in - (row + 1) * height - row * _GAP_IN
+def _grid(plotted: Plotted, panels: Sequence[PlotPanel]) -> Figure:
+    draw, most_columns, share = GRIDS[plotted.kind]
+    sheet, boxes = _laid_out(plotted, len(panels), most_columns, share, panels)
+    for box, panel in zip(boxes, panels, strict=True):
         name = f"{panel.session}: test {panel.test}" if len(plotted.found.sessions) > 1 else f"test {panel.test}"
-        draw(sheet, Box(left, bottom, each, height), name, panel.drawn)
+        draw(sheet, box, name, panel.drawn)
     return sheet.figure
+
+
+GRIDS = {
+    PlotKind.POLAR: (draw_polar, 4, 1.0),
+    PlotKind.DEVIATION: (draw_deviation, 2, 0.5),
+    PlotKind.SPECTRUM: (draw_spectrum, 2, 0.55),
+}
+"""What draws a test in kinds of figures that lay tests out in a grid; greatest number of columns; height over width."""
+
+
+def _laid_out(
+    plotted: Plotted, count: int, most_columns: int, share: float, panels: Sequence[PlotPanel] = ()
+) -> tuple[Sheet, list[Box]]:
+    columns = min(most_columns, count)
+    rows = -(-count // columns)
+    width_in = NARROW_IN if columns == 1 else WIDE_IN
+    each = (width_in - 2.0 * MARGIN_IN - (columns - 1) * _GAP_IN) / columns
+    height = share * each + (CAPTION_IN if panels else 0.0)
+    sheet = _sheet(plotted, width_in, rows * height + (rows - bool(panels)) * _GAP_IN, panels)
+    places = [divmod(k, columns) for k in range(count)]
+    return sheet, [
+        Box(MARGIN_IN + column * (each + _GAP_IN), sheet.top_in - (row + 1) * height - row * _GAP_IN, each, height)
+        for row, column in places
+    ]
 
 
 def _compare(plotted: Plotted, panels: Sequence[PlotPanel]) -> Figure:
@@ -202,15 +208,9 @@ def _compare(plotted: Plotted, panels: Sequence[PlotPanel]) -> Figure:
 def _map(plotted: Plotted) -> Figure:
     shown = plotted.found.shown
     sessions = [s for s in plotted.found.sessions if any(one.session == s.name for one in shown)]
-    columns = min(2, len(sessions))
-    rows = -(-len(sessions) // columns)
-    width_in = NARROW_IN if columns == 1 else WIDE_IN
-    each = (width_in - 2.0 * MARGIN_IN - (columns - 1) * _GAP_IN) / columns
-    sheet = _sheet(plotted, width_in, rows * (each + _GAP_IN), [])
-    for k, session in enumerate(sessions):
-        row, column = divmod(k, columns)
-        box = Box(MARGIN_IN + column * (each + _GAP_IN), sheet.top_in - (row + 1) * each - row * _GAP_IN, each, each)
-        name = f"{session.name}, plan {session.plan.name}" if columns > 1 else ""
+    sheet, boxes = _laid_out(plotted, len(sessions), 2, 1.0)
+    for box, session in zip(boxes, sessions, strict=True):
+        name = f"{session.name}, plan {session.plan.name}" if len(sessions) > 1 else ""
         draw_map(sheet, box, name, session.plan.tests, [one for one in shown if one.session == session.name])
     return sheet.figure
 

@@ -28,7 +28,6 @@ from dbbstation.results.report import (
 from dbbstation.results.report_verdict import verdict_of
 from dbbstation.results.tolerances import tolerated_circles, tolerated_pairs
 from dbbstation.results.words import unseen_sentence, weak_sentence
-from dbbstation.sources.contract import Owner
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
@@ -45,18 +44,10 @@ if TYPE_CHECKING:
 
 def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tuple[str, str, str, str, str], ...]:
     """Return rows of source, parameter, value, U and unit; a dash for unknown U."""
-    u = identified.uncertainties
     rows = []
-    for fitted in identified.model.sources:
-        if fitted.source.belongs_to is not Owner.MACHINE:
-            continue
-        named = fitted.source.parameters(identified.model.machine)
-        for parameter, value in zip(named, fitted.values, strict=True):
-            known = u.get((fitted.source.name, fitted.shared, parameter.name))
-            shown = (f"{float(value):.5g}", "-")
-            if known is not None:
-                shown = to_its_place(float(value), coverage_factor * float(known))
-            rows.append((fitted.source.name, parameter.name, *shown, parameter.unit))
+    for source, parameter, value, u in identified.of_machine(identified.uncertainties):
+        shown = (f"{value:.5g}", "-") if u is None else to_its_place(value, coverage_factor * u)
+        rows.append((source, parameter.name, *shown, parameter.unit))
     return tuple(rows)
 
 

@@ -10,7 +10,7 @@ from dbbstation.calibration.reporting.evaluation import EvaluatedRun, EvaluatedT
 from dbbstation.calibration.reporting.figures import CalibrationFigures, Covariance
 from dbbstation.facts import picked
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
-from dbbstation.facts.value import Value, finite
+from dbbstation.facts.value import finite
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.provenance import Provenance
 from dbbstation.model.identified import IdentifiedModel
@@ -82,11 +82,6 @@ class CalibrationResult(WithModel, CalibrationFigures):
     method: str
     centre_u_um: tuple[float | None, float | None, float | None]
     covariance: Covariance
-
-    @property
-    def parameters(self) -> dict[str, Value]:
-        """Return the machine's parameters as `source.parameter`, with standard uncertainties."""
-        return {f"{one.name}.{name}": value for one in self.sources for name, value in one.parameters.items()}
 
     def headline(self) -> str:
         """Return the number of parameters and the residual."""

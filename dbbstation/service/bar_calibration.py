@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 from pydantic import ValidationError
 
+from dbbstation.computing.counted import uncounted
 from dbbstation.errors import InputError, InstrumentError, StationError
 from dbbstation.facts.quantities import USUAL_STROKE_MM, Quantity
 from dbbstation.files.formats.bar import AFTER_MISREAD, BarFile, CalibratorSchema, write_bar
@@ -18,9 +19,10 @@ from dbbstation.trace.reachable import Reachable
 from dbbstation.trace.steady import steady
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
     from pathlib import Path
 
+    from dbbstation.computing.counted import Counted
     from dbbstation.files.yaml.schema import Schema
     from dbbstation.instrument.driver import Instrument
     from dbbstation.instrument.reading import Reading
@@ -36,7 +38,7 @@ def read_on_calibrator(
     source: Instrument,
     count: int = USUAL_READINGS,
     resolution_um: float | None = None,
-    progress: Callable[[int, int], None] = lambda _done, _of: None,
+    progress: Counted = uncounted,
 ) -> Steady:
     """Return the mean of good readings, without readings that a resting bar cannot have.
 

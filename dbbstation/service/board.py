@@ -218,6 +218,10 @@ class Board:
         """Return planned runs without accepted recording."""
         return tuple(task for task, mark in zip(self.tasks, self.marks, strict=True) if mark is not Mark.ACCEPTED)
 
+    def marks_of(self, test: str) -> list[tuple[Task, Mark]]:
+        """Return the planned runs of a test with their marks."""
+        return [(task, mark) for task, mark in zip(self.tasks, self.marks, strict=True) if task.test == test]
+
     def in_doubt(self, test: str, direction: Direction) -> bool:
         """Return whether an accepted run of a test and direction contradicts the others."""
         return any((one.run.test, one.run.direction) == (test, direction) for one in self.doubted.values())

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.errors import ModelError
+from dbbstation.facts import of_facts
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Names, Option, drawing, paths_of, task
 from dbbstation.tasks.telling import Telling
@@ -121,8 +122,9 @@ def calibrate(
     telling.stage("observability")
     figures = calibration_figures(calibration, evaluated, outliers)
     model = identified_model(calibration, report_of(figures, method=str(way)), recorded.sessions)
-    return CalibrationResult(
-        **{one.name: getattr(figures, one.name) for one in fields(figures)},
+    return of_facts(
+        CalibrationResult,
+        figures,
         method=str(way),
         centre_u_um=greatest_u_um(model, [one.standing_pose for one in runs]),
         covariance=covariance_of(model),

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.circles.analysis import analyse, analyse_pair, refiltered
 from dbbstation.circles.budget import SetUpKnowledge
+from dbbstation.computing.counted import uncounted
 from dbbstation.errors import TraceError
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.judged import judge_session
@@ -17,10 +18,11 @@ from dbbstation.tasks.load import no_run_left, with_tests
 from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
     from dbbstation.circles.path import Filter
+    from dbbstation.computing.counted import Counted
     from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.model.identified import IdentifiedModel
@@ -38,7 +40,7 @@ def load_circles(
     *,
     findings: bool = False,
     model: IdentifiedModel | None = None,
-    progress: Callable[[int, int], None] = lambda _done, _of: None,
+    progress: Counted = uncounted,
 ) -> Circled:
     """Read sessions and compute the figures of accepted runs.
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.counted import Counted
     from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.provenance import Provenance
     from dbbstation.files.recordings.session import SessionFolder
@@ -101,9 +102,7 @@ def angles_deg(recording: Recording, circle: Circle) -> Floats:
     return np.where(on_turn, np.mod(circle.theta_deg(phi), FULL_TURN_DEG), np.nan)
 
 
-def blocks(
-    what: Exporting, progress: Callable[[int, int], None], say: Callable[[str], None]
-) -> Iterator[dict[str, Floats | list[str]]]:
+def blocks(what: Exporting, progress: Counted, say: Callable[[str], None]) -> Iterator[dict[str, Floats | list[str]]]:
     """Yield the columns of each run: arrays of numbers with NaN for gaps, and lists of texts.
 
     Raises:

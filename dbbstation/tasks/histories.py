@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from dbbstation.computing.counted import uncounted
 from dbbstation.errors import InputError, StationError
 from dbbstation.facts.serialise import json_of, read_json
 from dbbstation.files.gateway import digest_of
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
     from os import PathLike
 
+    from dbbstation.computing.counted import Counted
     from dbbstation.history.trend import TrendOptions
     from dbbstation.results.history import HistoryResult
 
@@ -40,7 +42,7 @@ def histories_in(
     source_files: Sequence[Path] = (),
     *,
     rebuild: bool = False,
-    counted: Callable[[int, int], None] = lambda _done, _of: None,
+    counted: Counted = uncounted,
 ) -> HistoryResult:
     """Return the histories of all machines with sessions in a folder, at most four levels deep.
 
@@ -125,7 +127,7 @@ class _Unreadable:
 
 
 class _Reading:
-    def __init__(self, kept: Kept, progress: Callable[[int, int], None], of: int) -> None:
+    def __init__(self, kept: Kept, progress: Counted, of: int) -> None:
         self.of = of
         self.left_out: list[tuple[str, str]] = []
         self.worked_out = 0

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.counted import uncounted
 from dbbstation.errors import InputError, Problem, StationError, refuse
 from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.files.recordings.session import SessionFolder, opened
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
+    from dbbstation.computing.counted import Counted
     from dbbstation.machine.geometry import Machine
     from dbbstation.tasks.telling import Progress
     from dbbstation.trace.recording import RawCircle, Recording
@@ -103,7 +105,7 @@ def loaded(sessions: Sessions | Recorded, tests: Sequence[str], exclude: Sequenc
 def load_sessions(
     paths: Sequence[Path | SessionFolder],
     exclude: Sequence[str] = (),
-    progress: Callable[[int, int], None] = lambda _done, _of: None,
+    progress: Counted = uncounted,
     only: Sequence[str] = (),
 ) -> Recorded:
     """Read sessions, cut accepted runs to circles and attach commands.

@@ -21,7 +21,6 @@ from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunF
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.tolerances import tolerated_circles
-from dbbstation.sources.contract import Owner
 from dbbstation.tasks.circle_runs import load_circles
 
 if TYPE_CHECKING:
@@ -150,14 +149,7 @@ def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures
 
 def machine_parameters(identified: IdentifiedModel) -> tuple[ModelParameter, ...]:
     """Return the machine's parameters, with uncertainties of differences between sessions."""
-    u = identified.uncertainties_between_sessions
-    parameters = []
-    for fitted in identified.model.sources:
-        if fitted.source.belongs_to is not Owner.MACHINE:
-            continue
-        for parameter, value in zip(fitted.source.parameters(identified.model.machine), fitted.values, strict=True):
-            sure = u.get((fitted.source.name, fitted.shared, parameter.name)) or None  # zero: held at nominal
-            parameters.append(
-                _as_printed(ModelParameter(fitted.source.name, parameter.name, float(value), sure, parameter.unit))
-            )
-    return tuple(parameters)
+    return tuple(
+        _as_printed(ModelParameter(source, one.name, value, u or None, one.unit))  # zero: held at nominal
+        for source, one, value, u in identified.of_machine(identified.uncertainties_between_sessions)
+    )

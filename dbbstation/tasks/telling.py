@@ -9,6 +9,8 @@ from dbbstation.errors import StationError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dbbstation.computing.counted import Counted
+
 
 READING = "reading runs"
 """Stage of a task that reads sessions."""
@@ -63,7 +65,7 @@ class Telling:
             raise StoppedError("the work was stopped", where=text)
         self._progress(text, done, of)
 
-    def counted(self, text: str) -> Callable[[int, int], None]:
+    def counted(self, text: str) -> Counted:
         """Return a callback for the completed pieces of a stage."""
         return lambda done, of: self.stage(text, done, of)
 

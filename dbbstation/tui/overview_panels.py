@@ -102,7 +102,6 @@ class PlateMap(Panel):
         self._name_room = min(max(map(len, shown.tests), default=0), _CELL - 7)
 
     def text(self, board: Board) -> Content:
-        signs = _signs(board)
         bores = self._show.bores
         xs = sorted({x for x, _ in bores.values()})
         ys = sorted({y for _, y in bores.values()}, reverse=True)
@@ -115,7 +114,7 @@ class PlateMap(Panel):
         rows: list[Content] = []
         for y in ys:
             in_row = {x: number for number, (x, at) in bores.items() if at == y}
-            cells = [self._bore(in_row.get(x), board, signs, width, words=words) for x in xs]
+            cells = [self._bore(in_row.get(x), board, width, words=words) for x in xs]
             deepest = max(len(cell) for cell in cells)
             empty = Content(" " * width)
             rows += [Content("").join([cell[k] if k < len(cell) else empty for cell in cells]) for k in range(deepest)]
@@ -123,26 +122,22 @@ class PlateMap(Panel):
         elsewhere = [name for name, test in self._show.tests.items() if test.ball.bore not in bores]
         if elsewhere:
             rows.append(Content.styled("in no bore", "dim"))
-            rows += [self._test(name, board, signs, width) for name in elsewhere]
+            rows += [self._test(name, board, width) for name in elsewhere]
         return lines(*rows)
 
-    def _bore(
-        self, number: int | None, board: Board, signs: dict[str, list[tuple[Task, Mark]]], width: int, *, words: bool
-    ) -> list[Content]:
+    def _bore(self, number: int | None, board: Board, width: int, *, words: bool) -> list[Content]:
         if number is None:
             return []
         mine = [name for name, test in self._show.tests.items() if test.ball.bore == number]
         title = f"bore {number}"
         rows = [Content.styled(f" {title:{width - 1}}", "bold" if mine else "dim")]
         for name in mine:
-            rows += self._directions(name, board, signs, width) if words else [self._test(name, board, signs, width)]
+            rows += self._directions(name, board, width) if words else [self._test(name, board, width)]
         return rows
 
-    def _directions(
-        self, name: str, board: Board, signs: dict[str, list[tuple[Task, Mark]]], width: int
-    ) -> list[Content]:
+    def _directions(self, name: str, board: Board, width: int) -> list[Content]:
         rows: list[Content] = []
-        for task, mark in signs.get(name, []):
+        for task, mark in board.marks_of(name):
             if task.occurrence > 1:
                 continue
             sign, style = SIGNS[mark]
@@ -152,9 +147,9 @@ class PlateMap(Panel):
             rows.append(_filled(text, None if known is None else known.circularity_um, width))
         return rows
 
-    def _test(self, name: str, board: Board, signs: dict[str, list[tuple[Task, Mark]]], width: int) -> Content:
+    def _test(self, name: str, board: Board, width: int) -> Content:
         text = self._titled(name)
-        for _, mark in signs.get(name, []):
+        for _, mark in board.marks_of(name):
             text += Content.styled(*SIGNS[mark])
         figures = [board.figures_of(name, way) for way in self._show.tests[name].directions]
         known = [one.circularity_um for one in figures if one is not None]
@@ -254,13 +249,6 @@ def _decided(board: Board, completed: RunCompleted) -> Content:
         for finding in completed.wrong
     ]
     return Content(" · ").join(parts)
-
-
-def _signs(board: Board) -> dict[str, list[tuple[Task, Mark]]]:
-    marks: dict[str, list[tuple[Task, Mark]]] = {}
-    for task, mark in zip(board.tasks, board.marks, strict=True):
-        marks.setdefault(task.test, []).append((task, mark))
-    return marks
 
 
 def _run(board: Board, task: Task, mark: Mark, *, marked: bool, wide: bool) -> Content:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from textual.containers import Vertical
 from textual.content import Content
@@ -19,21 +19,32 @@ if TYPE_CHECKING:
 
     from textual.app import ComposeResult
     from textual.binding import BindingType
+    from textual.widget import Widget
+
+_Answer = TypeVar("_Answer")
 
 
-class ChooseQuestion(ModalScreen[int | None]):
+class _Question(ModalScreen[_Answer]):
+    """A text, and what is answered with beneath it."""
+
+    def __init__(self, text: str, *beneath: Widget) -> None:
+        super().__init__()
+        self._text, self._beneath = text, beneath
+
+    def compose(self) -> ComposeResult:
+        with Vertical():
+            yield Static(self._text, markup=False)
+            yield from self._beneath
+
+
+class ChooseQuestion(_Question[int | None]):
     """Returns the index of the choice, or None."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,q,ctrl+c", "dismiss(None)", "Back")]
 
     def __init__(self, title: str, labels: Sequence[str], at: int = 0) -> None:
-        super().__init__()
-        self._title, self._rows, self._at = title, [Content(label) for label in labels], at
-
-    def compose(self) -> ComposeResult:
-        with Vertical():
-            yield Static(self._title, markup=False)
-            yield OptionList(*(Option(row) for row in self._rows))
+        self._rows, self._at = [Content(label) for label in labels], at
+        super().__init__(title, OptionList(*(Option(row) for row in self._rows)))
 
     def on_mount(self) -> None:
         options = self.query_one(OptionList)
@@ -48,19 +59,13 @@ class ChooseQuestion(ModalScreen[int | None]):
         self.dismiss(chosen.option_index)
 
 
-class TypeQuestion(ModalScreen[str | None]):
+class TypeQuestion(_Question[str | None]):
     """Returns the stripped text, or None."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,ctrl+c", "dismiss(None)", "Back")]
 
     def __init__(self, title: str, text: str = "") -> None:
-        super().__init__()
-        self._title, self._text = title, text
-
-    def compose(self) -> ComposeResult:
-        with Vertical():
-            yield Static(self._title, markup=False)
-            yield Input(value=self._text, placeholder="type it, then Enter; Esc goes back")
+        super().__init__(title, Input(value=text, placeholder="type it, then Enter; Esc goes back"))
 
     def on_input_submitted(self, submitted: Input.Submitted) -> None:
         self.dismiss(submitted.value.strip())
@@ -81,7 +86,7 @@ class TemperatureQuestion(TypeQuestion):
             self.query_one(Static).update(f"{texts.NO_NUMBER.format(text=text)} {texts.TEMPERATURE_NOW}")
 
 
-class ReasonQuestion(ModalScreen[str | None]):
+class ReasonQuestion(_Question[str | None]):
     """Returns the reason, or None for no change."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -90,17 +95,13 @@ class ReasonQuestion(ModalScreen[str | None]):
     ]
 
     def __init__(self, run: str, *, counts: bool = False) -> None:
-        super().__init__()
         self._reasons = texts.ALL_THE_SAME if counts else texts.REASONS
         wrong = f"Something is wrong with {run}. Why does it count all the same?"
-        self._title = wrong if counts else f"Why does {run} not count?"
-
-    def compose(self) -> ComposeResult:
+        title = wrong if counts else f"Why does {run} not count?"
         told = [*self._reasons, "type another reason"]
         reasons = "\n".join(f"{number}  {reason}" for number, reason in enumerate(told, start=1))
-        with Vertical():
-            yield Static(f"{self._title}\n\n{reasons}\n\nEsc  leaves it as it is", markup=False)
-            yield Input(placeholder="type the reason, then Enter", disabled=True)
+        typed = Input(placeholder="type the reason, then Enter", disabled=True)
+        super().__init__(f"{title}\n\n{reasons}\n\nEsc  leaves it as it is", typed)
 
     def action_because(self, number: int) -> None:
         if number <= len(self._reasons):
@@ -119,21 +120,13 @@ class ReasonQuestion(ModalScreen[str | None]):
             self.dismiss(submitted.value.strip())
 
 
-class YesQuestion(ModalScreen[bool]):
+class YesQuestion(_Question[bool]):
     """Returns whether the answer is yes."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         ("y", "answer(True)", "Yes"),
         ("n,escape,ctrl+c,q", "answer(False)", "Go on"),
     ]
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self._text = text
-
-    def compose(self) -> ComposeResult:
-        with Vertical():
-            yield Static(self._text, markup=False)
 
     def action_answer(self, answer: bool) -> None:  # noqa: FBT001 - called by a key's action string
         self.dismiss(answer)

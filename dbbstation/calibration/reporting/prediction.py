@@ -8,15 +8,17 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import residuals
 from dbbstation.calibration.reporting.evaluation import LowPassedCircularity
+from dbbstation.computing.counted import uncounted
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.harmonics import smooth_of
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.trace.analysis import figures_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.counted import Counted
     from dbbstation.model.observation import Observation
     from dbbstation.trace.recording import RawCircle
 
@@ -30,7 +32,7 @@ SAMPLES_PER_UNDULATION = 4
 def predicted_circles(
     model: MachineModel,
     observations: Sequence[Observation],
-    progress: Callable[[int, int], None] = lambda _done, _of: None,
+    progress: Counted = uncounted,
 ) -> tuple[LowPassedCircularity, ...]:
     """Compare measured and predicted circularity.
 

@@ -14,7 +14,7 @@ from click.core import ParameterSource
 
 from dbbstation import __version__
 from dbbstation.files.places import name_of
-from dbbstation.text.written import on_one_line, printable
+from dbbstation.text.written import on_one_line, printable, words
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -196,22 +196,7 @@ def _told(worst: WorstRun | None) -> tuple[str, str]:
 
 PROGRAM = f"dbbstation {__version__}"
 
-_NO_CONTENT = frozenset(
-    {
-        "out",
-        "table",
-        "allow",
-        "page",
-        "pdf",
-        "figure",
-        "log",
-        "force",
-        "as_json",
-        "jobs",
-        "scheduler",
-        "anew",
-    }
-)
+_NO_CONTENT = frozenset(words("out, table, allow, page, pdf, figure, log, force, as_json, jobs, scheduler, anew"))
 """Parameters that affect only the place, form or speed of results, not their content. They are left out of the
 provenance, so that the same inputs give the same bytes under every name."""
 

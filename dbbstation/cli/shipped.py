@@ -13,45 +13,20 @@ from dbbstation.files.gateway import content_of
 from dbbstation.files.places import shipped_folder
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
-from dbbstation.text.written import on_one_line
+from dbbstation.text.written import on_one_line, words
 
-_FIXTURES = (
-    "bars",
-    "cmm",
-    "drives",
-    "foreign",
-    "gauges",
-    "jigs",
-    "jobs",
-    "machines",
-    "mappings",
-    "models",
-    "nc",
-    "settings",
-    "simulators",
-    "sources",
-    "tables",
+_FIXTURES = words(
+    "bars, cmm, drives, foreign, gauges, jigs, jobs, machines, mappings, models, nc, settings, simulators, "
+    "sources, tables"
 )
 _SESSION = "sessions/small"
 
 EXAMPLES = {
     **{
         f"{name}/": _SESSION
-        for name in (
-            "2026-11-20-hexapod-7",
-            "session",
-            "sessions/monday",
-            "monday",
-            "tuesday",
-            "measured",
-            "check-session",
-            "recorded-elsewhere",
-            "standard-test",
-            "before",
-            "after",
-            "verified",
-            "hall-1/monday",
-            "hall-2/tuesday",
+        for name in words(
+            "2026-11-20-hexapod-7, session, sessions/monday, monday, tuesday, measured, check-session, "
+            "recorded-elsewhere, standard-test, before, after, verified, hall-1/monday, hall-2/tuesday"
         )
     },
     **{

@@ -24,6 +24,11 @@ def listed(names: Sequence[str], most: int, *, between: str = ", ") -> str:
     return between.join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
+def words(text: str) -> tuple[str, ...]:
+    """Return the parts of a text that commas separate."""
+    return tuple(text.split(", "))
+
+
 class Repeated(Protocol):
     """A run with its test, direction and repeat."""
 

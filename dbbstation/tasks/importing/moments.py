@@ -8,21 +8,12 @@ from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from typing import TYPE_CHECKING
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
+from dbbstation.text.written import words
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-DATE_KEYS = (
-    "started",
-    "start",
-    "date",
-    "datum",
-    "datetime",
-    "date/time",
-    "date time",
-    "test date",
-    "measured",
-    "begin",
-)
+DATE_KEYS = words("started, start, date, datum, datetime, date/time, date time, test date, measured, begin")
 """Keys of lines above a table with its date, in small letters; the first one found counts."""
 
 TIME_KEYS = ("time", "uhrzeit", "zeit", "start time", "startzeit", "test time")

@@ -17,6 +17,7 @@ from dbbstation.files.formats.mapping import (
     TIME,
     UNITS,
 )
+from dbbstation.text.written import words
 from dbbstation.trace import columns
 from dbbstation.trace.columns import ColumnKind
 
@@ -24,110 +25,26 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 _WORDS = {
-    TIME: {
-        "time",
-        "t",
-        "zeit",
-        "elapsed",
-        "sec",
-        "seconds",
-        "temps",
-        "tempo",
-        "tiempo",
-        "tid",
-        "tijd",
-        "čas",
-        "czas",
-        "время",
-        "时间",
-        "時間",
-    },
-    ANGLE: {
-        "angle",
-        "theta",
-        "winkel",
-        "phi",
-        "angolo",
-        "ángulo",
-        "angulo",
-        "ângulo",
-        "hoek",
-        "vinkel",
-        "úhel",
-        "kąt",
-        "угол",
-        "角度",
-        "각도",
-    },
-    DEVIATION: {
-        "deviation",
-        "dev",
-        "error",
-        "abweichung",
-        "fehler",
-        "écart",
-        "ecart",
-        "erreur",
-        "scostamento",
-        "deviazione",
-        "errore",
-        "desviación",
-        "desviacion",
-        "desvio",
-        "erro",
-        "afwijking",
-        "avvikelse",
-        "avvik",
-        "odchylka",
-        "odchyłka",
-        "отклонение",
-        "偏差",
-        "誤差",
-        "误差",
-        "편차",
-    },
-    LENGTH: {
-        "length",
-        "distance",
-        "radius",
-        "laenge",
-        "länge",
-        "abstand",
-        "longueur",
-        "distanza",
-        "lunghezza",
-        "longitud",
-        "comprimento",
-        "lengte",
-        "längd",
-        "lengde",
-        "délka",
-        "długość",
-        "длина",
-        "长度",
-        "長さ",
-        "半径",
-        "半徑",
-        "길이",
-    },
-    DIRECTION: {"richtung", "dir", "sens", "direzione", "dirección", "direção"},
+    TIME: words("time, t, zeit, elapsed, sec, seconds, temps, tempo, tiempo, tid, tijd, čas, czas, время, 时间, 時間"),
+    ANGLE: words(
+        "angle, theta, winkel, phi, angolo, ángulo, angulo, ângulo, hoek, vinkel, úhel, kąt, угол, 角度, 각도"
+    ),
+    DEVIATION: words(
+        "deviation, dev, error, abweichung, fehler, écart, ecart, erreur, scostamento, deviazione, errore, "
+        "desviación, desviacion, desvio, erro, afwijking, avvikelse, avvik, odchylka, odchyłka, отклонение, 偏差, "
+        "誤差, 误差, 편차"
+    ),
+    LENGTH: words(
+        "length, distance, radius, laenge, länge, abstand, longueur, distanza, lunghezza, longitud, comprimento, "
+        "lengte, längd, lengde, délka, długość, длина, 长度, 長さ, 半径, 半徑, 길이"
+    ),
+    DIRECTION: words("richtung, dir, sens, direzione, dirección, direção"),
 }
 """Words in names of columns by meaning, in several languages; a radius deviation is a deviation."""
 
-_NO_READINGS = {
-    "nominal",
-    "nom",
-    "target",
-    "commanded",
-    "soll",
-    "sollwert",
-    "set",
-    "programmed",
-    "nominale",
-    "théorique",
-    "目標",
-    "設定",
-}
+_NO_READINGS = words(
+    "nominal, nom, target, commanded, soll, sollwert, set, programmed, nominale, théorique, 目標, 設定"
+)
 """Words in names of columns with nominal values, which are no readings."""
 
 _UNIT_WORDS = {
@@ -204,10 +121,10 @@ def stated(text: str) -> tuple[str, Proposed] | None:
 
 
 def _meaning(name: str) -> str | None:
-    words = set(re.findall(r"[^\W\d_]+", re.sub(r"[\[(（].*", "", name).lower()))
-    if words & _NO_READINGS:
+    parts = set(re.findall(r"[^\W\d_]+", re.sub(r"[\[(（].*", "", name).lower()))
+    if not parts.isdisjoint(_NO_READINGS):
         return None
-    return next((meaning for meaning, known in _WORDS.items() if words & known), None)
+    return next((meaning for meaning, known in _WORDS.items() if not parts.isdisjoint(known)), None)
 
 
 def _unit(text: str, meaning: str) -> str:

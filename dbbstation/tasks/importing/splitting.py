@@ -12,6 +12,7 @@ from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.files.formats.mapping import ANGLE, DEVIATION, LENGTH, TIME
 from dbbstation.files.recordings.table_csv import NO_NUMBER
 from dbbstation.files.source_text import shortened
+from dbbstation.text.written import words
 from dbbstation.trace.cut import LARGEST_GAP_DEG
 
 if TYPE_CHECKING:
@@ -75,24 +76,7 @@ def _parts(n: int, begins: Integers) -> list[Integers]:
 
 
 OUT_OF_RANGE = frozenset(
-    {
-        "over",
-        "ovr",
-        "ovl",
-        "ol",
-        "o.l",
-        "overrange",
-        "overflow",
-        "over range",
-        "under",
-        "udr",
-        "ul",
-        "lo",
-        "hi",
-        "err",
-        "error",
-        "fault",
-    }
+    words("over, ovr, ovl, ol, o.l, overrange, overflow, over range, under, udr, ul, lo, hi, err, error, fault")
 )
 """Words of displays for a missing reading, in small letters, without surrounding signs and stars."""
 

@@ -13,6 +13,7 @@ from dbbstation.cli.declared import made
 from dbbstation.cli.mapping_options import MappingOptions, chosen_mapping, read_tables
 from dbbstation.cli.output import echo, echo_line, print_result, print_table, provenance
 from dbbstation.cli.session_options import SessionOptions
+from dbbstation.computing.grouped import grouped
 from dbbstation.errors import InputError, OutputError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
@@ -344,11 +345,7 @@ def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], unknown: Sequ
     if mapping.column(ANGLE) is not None and mapping.angle is not None:
         zero = "the start of the turn" if mapping.angle.zero_deg is None else f"{mapping.angle.zero_deg:g} degrees"
         found.append(f"angle 0 of the files is {zero}, their angles grow with {mapping.angle.grows}")
-    by_text: dict[str, list[str]] = {}
-    for one in runs:
-        for text in one.computed:
-            by_text.setdefault(text, []).append(one.name)
-    for text, names in by_text.items():
+    for text, names in grouped((text, one.name) for one in runs for text in one.computed).items():
         found.append(f"{text} ({'every run' if len(names) == len(runs) else ', '.join(names)})")
     return [*found, *(f"not stated: {one}" for one in unknown)]
 

@@ -11,6 +11,7 @@ import click
 from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.mapping_options import AsWritten
 from dbbstation.cli.output import echo, echo_line, print_table, provenance
+from dbbstation.computing.grouped import grouped
 from dbbstation.errors import InputError
 from dbbstation.files.formats.number_language import number_language
 from dbbstation.tasks import options as o
@@ -282,7 +283,4 @@ def _by_holder(rows: Sequence[Any], holder: str | None, sheet: Path) -> dict[str
             )
         centre = tuple(1e3 * value for value in row.centre_mm if np.isfinite(value))
         groups.setdefault((name, row.name or row.bore), []).append(centre)
-    found: dict[str, list[Any]] = {}
-    for (name, _), centres in groups.items():
-        found.setdefault(name, []).append(np.array(centres))
-    return found
+    return grouped((name, np.array(centres)) for (name, _), centres in groups.items())

@@ -9,6 +9,7 @@ import click
 from click.core import ParameterSource
 
 from dbbstation.cli.output import say
+from dbbstation.computing.grouped import grouped
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -119,8 +120,5 @@ def _settings(ctx: click.Context, values: Mapping[str, Any]) -> Settings:
 
 
 def _say_taken(taken: Iterable[tuple[Setting, str]]) -> None:
-    by_file: dict[Path, list[str]] = {}
-    for setting, text in taken:
-        by_file.setdefault(setting.file, []).append(text)
-    for file, texts in by_file.items():
+    for file, texts in grouped((setting.file, text) for setting, text in taken).items():
         say(f"settings: {', '.join(texts)} (from {file})")

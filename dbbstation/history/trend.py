@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.grouped import grouped
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.history.order import by_time
 from dbbstation.history.run_length import chart_for
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.history.record import Figure, ModelFigures, SessionFigures
+    from dbbstation.history.record import ModelFigures, SessionFigures
     from dbbstation.history.run_length import Chart
     from dbbstation.history.watch import Watched
     from dbbstation.plan.tolerance import Tolerance
@@ -176,10 +177,8 @@ def _why_not(subject: Subject, u: Floats) -> str:
 def _circle_series(sessions: Sequence[SessionFigures], asked: TrendOptions) -> dict[Subject, _Series]:
     found: dict[Subject, _Series] = {}
     for k, session in enumerate(sessions):
-        runs: dict[tuple[str, str, str], list[tuple[Figure, ...]]] = {}
-        for run in session.runs:
-            if asked.takes(run.test):
-                runs.setdefault((run.test, run.direction, run.circle), []).append(run.figures)
+        taken = (run for run in session.runs if asked.takes(run.test))
+        runs = grouped(((run.test, run.direction, run.circle), run.figures) for run in taken)
         for (test, direction, circle), repeats in runs.items():
             for place, figure in enumerate(repeats[0]):
                 value, u = figure.value_um, figure.stated_u_um

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.arrays import norm_of
+from dbbstation.computing.grouped import grouped
 from dbbstation.quality.beside import SIZES, NearAssignments, Readings, mean_of
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
 from dbbstation.quality.limits import LOG_ODDS_LIMIT
@@ -249,9 +250,7 @@ class Assigned:
     @cached_property
     def _changes(self) -> tuple[tuple[Integers, Integers], ...]:
         """Return runs, shape (m, k), and their other labels, (m, j, k), grouped by k and j."""
-        alike: dict[tuple[int, int], list[tuple[Sequence[int], Sequence[Sequence[int]]]]] = {}
-        for runs, instead in self._all_changes():
-            alike.setdefault((len(runs), len(instead)), []).append((runs, instead))
+        alike = grouped(((len(runs), len(instead)), (runs, instead)) for runs, instead in self._all_changes())
         return tuple(
             (np.array([runs for runs, _ in each]), np.array([labels for _, labels in each])) for each in alike.values()
         )
@@ -274,10 +273,7 @@ class Assigned:
 
     @cached_property
     def _groups(self) -> list[list[int]]:
-        found: dict[tuple[str, str], list[int]] = {}
-        for k, one in enumerate(self.runs):
-            found.setdefault((one.run.test, one.run.mounting), []).append(k)
-        return list(found.values())
+        return list(grouped(((one.run.test, one.run.mounting), k) for k, one in enumerate(self.runs)).values())
 
     def _as_test(self, group: Sequence[int], test: str) -> list[int]:
         """Return labels for a group's runs, taken as runs of a test; empty if the plan lacks such a circle."""
@@ -300,9 +296,8 @@ class Assigned:
     def _mistakes(self, changes: _Changes) -> float:
         """Return the cost of mistakes; a mounting filed under another test, or an exchange of two mountings, counts as one."""
         whole: set[frozenset[str]] = set()
-        single, by_group = 0, dict[int, list[str]]()
-        for run, label in changes:
-            by_group.setdefault(self._group_of[run], []).append(self._shown(run, label))
+        single = 0
+        by_group = grouped((self._group_of[run], self._shown(run, label)) for run, label in changes)
         for group, shown in by_group.items():
             runs = self._groups[group]
             if shown[0] and shown.count(shown[0]) == len(runs):

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from dbbstation.computing.arrays import norm_of
+from dbbstation.computing.grouped import grouped
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.quality.all_runs import AllForms, bar_of_all, programs_of_all
 from dbbstation.quality.between import direction, local_difference, locally_apart_um, other_direction, repeat
@@ -87,9 +88,7 @@ class SessionRuns:
 
     def __init__(self, runs: Sequence[Seen], known: SessionRuns | None = None) -> None:
         self._runs = [one for one in runs if one.analysis is not None]
-        self._of_test: dict[str, list[Seen]] = {}
-        for one in self._runs:
-            self._of_test.setdefault(one.run.test, []).append(one)
+        self._of_test = grouped((one.run.test, one) for one in self._runs)
         self._pairs: dict[tuple[Seen, Seen], _Pair] = {} if known is None else known._pairs  # noqa: SLF001 - the same class
         self._without: SessionRuns | None = None if known is None else known._without  # noqa: SLF001
         self._forms: AllForms = AllForms() if known is None else known._forms  # noqa: SLF001

@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 from scipy.special import chdtrc, chdtri, logsumexp
 
 from dbbstation.computing.arrays import median_of, place_of_largest
+from dbbstation.computing.grouped import grouped
 from dbbstation.quality.forms import FIRST_COSINE, FIRST_SINE
 from dbbstation.quality.limits import FEWEST_OTHERS, SHARE, median_length
 from dbbstation.trace.expected import COEFFICIENTS, along_travel
@@ -64,9 +65,7 @@ def together(one: Seen, runs: Sequence[Seen], forms: Forms) -> Together | None:
         return None
     forms.hold([(each,) for each in known])
     others = forms.part([(each,) for each in them], (one,))
-    of_test: dict[str, list[tuple[Seen]]] = {}
-    for each in them:
-        of_test.setdefault(each.run.test, []).append((each,))
+    of_test = grouped((each.run.test, (each,)) for each in them)
     apart_um, covariance_um2 = others.beside((one,))
     rows = {test: forms.rows(each) for test, each in of_test.items()}
     return Together((one, *them), others, rows, apart_um[:, :, 0], covariance_um2)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dbbstation import __version__
+from dbbstation.computing.grouped import grouped
 from dbbstation.errors import StationError
 from dbbstation.report.conditions import conditions
 from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, in_style, labelled
@@ -92,9 +93,7 @@ class Plotted:
             raise StationError(
                 f"only one session is there to compare, {several.pop()}", remedy="name two sessions or more"
             )
-        of: dict[tuple[str, str], list[MeasuredCircle]] = {}
-        for one in shown:
-            of.setdefault((one.session, one.entry.test), []).append(one)
+        of = grouped(((one.session, one.entry.test), one) for one in shown)
         drawn = {key: chosen(runs, MOST_DRAWN) for key, runs in of.items()}
         return [PlotPanel(*key, tuple(drawn[key]), len(runs) - len(drawn[key])) for key, runs in of.items()]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.computing.grouped import grouped
 from dbbstation.facts.digits import decimals_of
 from dbbstation.report.history_words import DASH
 from dbbstation.report.html import environment
@@ -23,9 +24,7 @@ REACH = 6.0
 
 def fleet_html(result: FleetResult, provenance: Provenance) -> bytes:
     """Return a fleet as HTML without script, linking only to its results."""
-    machines: dict[str, list[FleetSession]] = {}
-    for session in result.sessions:
-        machines.setdefault(session.machine or session.session, []).append(session)
+    machines = grouped((session.machine or session.session, session) for session in result.sessions)
     rows = [_row(name, sessions, result) for name, sessions in machines.items()]
     ticks = [(x, label) for label, x in ((f"{tick:+d}" if tick else "0", _place(tick)) for tick in (-4, -2, 0, 2, 4))]
     content = {

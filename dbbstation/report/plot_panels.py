@@ -10,6 +10,7 @@ from matplotlib.patches import Circle as Ring
 
 from dbbstation.circles.estimates import FIRST
 from dbbstation.computing.arrays import hypot_of, largest_size
+from dbbstation.computing.grouped import grouped
 from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.plan.plan import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, SET
@@ -251,9 +252,7 @@ def _arrow(axes: Axes, tail: np.ndarray, along: np.ndarray, colour: str) -> None
 
 
 def _centres_um(circles: Sequence[MeasuredCircle]) -> dict[str, np.ndarray]:
-    by_test: dict[str, list[tuple[float, float]]] = {}
-    for one in circles:
-        by_test.setdefault(one.entry.test, []).append(one.analysed.centre_mm)
+    by_test = grouped((one.entry.test, one.analysed.centre_mm) for one in circles)
     return {test: 1e3 * np.mean(of, axis=0) for test, of in by_test.items()}
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field
 
+from dbbstation.computing.grouped import grouped
 from dbbstation.facts import of_facts, picked
 from dbbstation.facts.serialise import Kept
 from dbbstation.facts.value import finite
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
     from dbbstation.history.record import SessionFigures
     from dbbstation.history.trend import MachineHistory, Trend, TrendOptions
-    from dbbstation.history.watch import TrendVerdict
 
 
 @dataclass(frozen=True)
@@ -251,11 +251,11 @@ def _session(session: SessionFigures) -> HistorySession:
 
 
 def _changes(one: MachineHistory, sessions: Sequence[HistorySession]) -> Iterator[HistoryChange]:
-    found: dict[tuple[int, int, TrendVerdict], list[tuple[Trend, TrendEvent[int]]]] = {}
-    for trend in one.trends:
-        for event in trend.watched.events:
-            key = (int(trend.at[event.found]), int(trend.at[event.since]), event.verdict)
-            found.setdefault(key, []).append((trend, event))
+    found = grouped(
+        ((int(trend.at[event.found]), int(trend.at[event.since]), event.verdict), (trend, event))
+        for trend in one.trends
+        for event in trend.watched.events
+    )
     for (shown, since, verdict), events in sorted(found.items()):
         sizes = sorted(events, key=lambda pair: -abs(pair[1].difference) / pair[1].u_difference)
         yield HistoryChange(

@@ -10,6 +10,7 @@ import numpy as np
 from dbbstation.circles.analysis import analyse, analyse_pair, refiltered
 from dbbstation.circles.budget import SetUpKnowledge
 from dbbstation.computing.counted import uncounted
+from dbbstation.computing.grouped import grouped
 from dbbstation.errors import TraceError
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.judged import judge_session
@@ -81,9 +82,7 @@ def load_circles(
 
 
 def _many(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:
-    of: dict[str, list[str]] = {}
-    for run in runs:
-        of.setdefault(f"{run.test} {run.direction}", []).append(str(run.repeat))
+    of = grouped((f"{run.test} {run.direction}", str(run.repeat)) for run in runs)
     return [
         f"{session.name}: {len(repeats)} runs of {circle} are accepted ({', '.join(sorted(repeats, key=int))}): all are shown, and a fit "
         "takes all of them"

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from dbbstation.computing.counted import uncounted
+from dbbstation.computing.grouped import grouped
 from dbbstation.errors import InputError, StationError
 from dbbstation.facts.serialise import json_of, read_json
 from dbbstation.files.gateway import digest_of
@@ -253,10 +254,7 @@ MOST_NAMED = 3
 
 
 def _gathered(sessions: Sequence[SessionFigures]) -> list[str]:
-    by_text: dict[str, list[str]] = {}
-    for one in sessions:
-        for note in one.notes:
-            by_text.setdefault(note, []).append(one.name)
+    by_text = grouped((note, one.name) for one in sessions for note in one.notes)
     return [f"{listed(names, MOST_NAMED)}: {note}" for note, names in by_text.items()]
 
 

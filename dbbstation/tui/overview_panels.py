@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from dbbstation.computing.grouped import grouped
 from dbbstation.plan.plan import Direction, circles_s
 from dbbstation.quality.finding import against_limit
 from dbbstation.service.board import Mark, RunDecision, problem_alone
@@ -179,16 +180,15 @@ class TestList(Panel):
         self._choice = choice
 
     def text(self, board: Board) -> Content:
-        grouped: dict[tuple[str, int], list[tuple[Task, Mark]]] = {}
-        for task, mark in zip(board.tasks, board.marks, strict=True):
-            grouped.setdefault((task.test, task.occurrence), []).append((task, mark))
+        marked_tasks = zip(board.tasks, board.marks, strict=True)
+        groups = grouped(((task.test, task.occurrence), (task, mark)) for task, mark in marked_tasks)
         width = self.content_size.width
         wide = width >= _SHORTEST_NAME + 2 * (_WORD + _FIGURE)
         each = _WORD + (_FIGURE if wide else 0)
         room = max(width - 2 * (each + 1), _SHORTEST_NAME)
         rows: list[Content] = []
         at = 0
-        for (name, occurrence), group in grouped.items():
+        for (name, occurrence), group in groups.items():
             chosen = name == self._choice.test and occurrence == 1
             at = len(rows) if chosen else at
             title = name if occurrence == 1 else f"{name} again"

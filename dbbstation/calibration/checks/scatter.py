@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from dbbstation.computing.arrays import sum_of
+from dbbstation.computing.grouped import grouped
 from dbbstation.inference.harmonics import LOW, Misfit, misfit, smooth
 from dbbstation.inference.left_over import Remainder, remainder
 from dbbstation.trace.recording import means, sector_of
@@ -125,11 +126,8 @@ def check_scatter(seats: Sequence[MountingOffset]) -> list[ScatterCheck]:
     """Compare found and stated scatter by stated size."""
     # The sum of squares over the true variance is chi-square. Errors of the fitted machine are common to neighbouring
     # balls, which makes the interval slightly too narrow for few balls.
-    groups: dict[float, list[MountingOffset]] = {}
-    for seat in seats:
-        if seat.stated_mm[0] >= LEAST_STATED_MM:
-            continue
-        groups.setdefault(round(1e3 * float(seat.stated_mm[0]), 3), []).append(seat)
+    known = (seat for seat in seats if seat.stated_mm[0] < LEAST_STATED_MM)
+    groups = grouped((round(1e3 * float(seat.stated_mm[0]), 3), seat) for seat in known)
     return [_checked(stated_um, group) for stated_um, group in sorted(groups.items())]
 
 

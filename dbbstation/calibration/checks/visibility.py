@@ -15,6 +15,7 @@ from pydantic import computed_field
 
 from dbbstation.calibration.fit.directions import in_words
 from dbbstation.computing.arrays import place_of_largest, range_of, sum_of
+from dbbstation.computing.grouped import grouped
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.square_root import complement, lost_directions, spread_over
 
@@ -163,9 +164,8 @@ def _leverage(calibration: Calibration, fitted: Integers) -> dict[str, float]:
     # The trace approximates the number of parameters lost without the test. Effects shared with other tests, such as
     # the bar's length, count as unknowns.
     known, noise = calibration.layout.known, calibration.noise.effective
-    tests: dict[str, list[Block]] = {}
-    for observation, block in zip(calibration.observations, calibration.circle_blocks, strict=True):
-        tests.setdefault(observation.test, []).append(block)
+    runs = zip(calibration.observations, calibration.circle_blocks, strict=True)
+    tests = grouped((run.test, block) for run, block in runs)
     touched = {test: np.unique(np.concatenate([block.columns for block in blocks])) for test, blocks in tests.items()}
     times = np.bincount(np.concatenate(list(touched.values())), minlength=len(known.random))
     common = np.concatenate([fitted, np.flatnonzero(known.random & (times > 1))])
@@ -211,9 +211,8 @@ def check_plan(calibration: Calibration) -> PlanCheck:
     def determined(blocks: Sequence[Block]) -> int:
         return fitted - len(lost_directions(blocks, free, calibration.noise.effective))
 
-    by_test: dict[tuple[str, str], list[Block]] = {}
-    for run, block in zip(calibration.observations, calibration.circle_blocks, strict=True):
-        by_test.setdefault((run.setup.session, run.test), []).append(block)
+    runs = zip(calibration.observations, calibration.circle_blocks, strict=True)
+    by_test = grouped(((run.setup.session, run.test), block) for run, block in runs)
     each = [determined(blocks) for blocks in by_test.values()]
     return PlanCheck(len(each), sum(each), determined(calibration.circle_blocks), max(each))
 

@@ -22,6 +22,7 @@ from dbbstation.calibration.outliers.outlier import (
 )
 from dbbstation.calibration.outliers.stray_balls import ball_moved, off_its_place
 from dbbstation.computing.arrays import median_of, place_of_largest
+from dbbstation.computing.grouped import grouped
 from dbbstation.inference.square_root import chi2_without
 
 if TYPE_CHECKING:
@@ -55,9 +56,7 @@ def _strange_test(calibration: Calibration) -> list[int]:
         return []
     noise = max(fine_noise_mm(calibration), 1e-3 * LEAST_UM / STANDS_OUT)
     known, held = calibration.layout.known, calibration.solution.held
-    tests: dict[tuple[str, str], list[int]] = {}
-    for k, run in enumerate(calibration.observations):
-        tests.setdefault((run.setup.session, run.test), []).append(k)
+    tests = grouped(((run.setup.session, run.test), k) for k, run in enumerate(calibration.observations))
 
     counts = np.array([block.count for block in calibration.blocks])
 

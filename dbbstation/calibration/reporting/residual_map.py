@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.checks.scatter import LEAST_STATED_MM, seats_of
 from dbbstation.calibration.fit.calibrate import residuals
+from dbbstation.computing.grouped import grouped
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.harmonics import smooth
 from dbbstation.model.machine_model import MachineModel
@@ -144,9 +145,8 @@ def circle_tests(calibration: Calibration) -> tuple[CircleTest, ...]:
 
 def ball_shifts(calibration: Calibration) -> tuple[BallShift, ...]:
     """Return shifts of balls at stated places, without freed balls and balls under the spindle."""
-    tests: dict[str, list[str]] = {}
-    for observation, name in zip(calibration.observations, names_of_tests(calibration.observations), strict=True):
-        tests.setdefault(observation.setup.mounting, []).append(name)
+    named = zip(calibration.observations, names_of_tests(calibration.observations), strict=True)
+    tests = grouped((observation.setup.mounting, name) for observation, name in named)
     return tuple(
         BallShift(
             tests=tuple(dict.fromkeys(tests[seat.mounting])),

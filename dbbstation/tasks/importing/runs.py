@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.grouped import grouped
 from dbbstation.errors import MOST_FAULTS, InputError, Problem
 from dbbstation.files.formats.mapping import (
     ANGLE,
@@ -136,9 +137,7 @@ class Reader:
         cells = table.table.cells
         # A start may be another one in each row: the first of a run counts.
         named = [cells[name] for m, name in of_runs.items() if m != STARTED]
-        alike: dict[tuple[str, ...], list[int]] = {}
-        for k, key in enumerate(zip(*named, strict=True)):
-            alike.setdefault(key, []).append(k)
+        alike = grouped((key, k) for k, key in enumerate(zip(*named, strict=True)))
         groups = [np.array(each) for each in alike.values()] if named else self._split(table)
         return [(rows, {m: cells[name][int(rows[0])] for m, name in of_runs.items()}) for rows in groups]
 

@@ -272,16 +272,14 @@ def _told(name: str, run: RunEntry) -> Answer:
 
 
 def _repeated(read: SessionFolder) -> list[tuple[str, int]]:
-    from dbbstation.files.formats.session import RunState
 
-    counted = Counter(f"{run.test} {run.direction}" for run in read.in_state(RunState.ACCEPTED))
+    counted = Counter(f"{run.test} {run.direction}" for run in read.accepted)
     return [(circle, runs) for circle, runs in counted.items() if runs > 1]
 
 
 def _missing(read: SessionFolder) -> list[str]:
-    from dbbstation.files.formats.session import RunState
 
-    done = {(run.test, run.direction) for run in read.in_state(RunState.ACCEPTED)}
+    done = {(run.test, run.direction) for run in read.accepted}
     return [f"{name} {direction}" for name, direction in read.plan.runs() if (name, direction) not in done]
 
 

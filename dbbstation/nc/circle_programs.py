@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.computing.counted import uncounted
+from dbbstation.computing.counted import counting, uncounted
 from dbbstation.errors import StationError
 from dbbstation.machine.geometry import check_model_is_of
 from dbbstation.nc.circle_program import CLEARANCE_MM, STEP_DEG, chord_error_mm, circle_toolpath
@@ -58,8 +58,7 @@ def circle_programs(
         check_model_is_of(machine, inverse.model.machine)
     runs = plan.runs(chosen_of(plan.name, plan.tests, tests, ()))
     programs: list[Program] = []
-    for number, ((name, direction), circle) in enumerate(runs.items(), 1):
-        progress(len(programs), len(runs))
+    for number, ((name, direction), circle) in enumerate(counting(runs.items(), progress), 1):
         title = f"test {name} {direction}"
 
         step = step_deg
@@ -72,7 +71,6 @@ def circle_programs(
         programs.append(
             written_program(path, machine, dialect, f"{name}-{direction}", inverse, chord_mm, header, split=False)
         )
-    progress(len(programs), len(runs))
     return programs
 
 
@@ -88,15 +86,13 @@ def dry_run(
     """Check the nominal programs of all runs of a plan without writing them."""
     runs = plan.runs(tests)
     faults: list[StationError] = []
-    for done, ((name, direction), circle) in enumerate(runs.items()):
-        progress(done, len(runs))
+    for (name, direction), circle in counting(runs.items(), progress):
         path = circle_toolpath(circle, f"test {name} {direction}", step_deg=step_deg, clearance_mm=clearance_mm)
         for check in (check_reach, check_feeds):
             try:
                 check(machine, path)
             except StationError as error:
                 faults.append(error)
-    progress(len(runs), len(runs))
     return len(runs), faults
 
 

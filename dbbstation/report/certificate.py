@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
-from dbbstation.files.formats.session import RunState
+from dbbstation.files.formats.session import starts_of
 from dbbstation.files.recordings.event_log import CLOCK_S, impossible_day, sealed_at
 from dbbstation.results.report import CertificateState
 from dbbstation.text.written import listed
@@ -33,7 +33,7 @@ def certified(sessions: Sequence[SessionFolder], job: str, place: str, *, tolera
 
 def _lacking(session: SessionFolder, job: str) -> list[str]:
     bar = session.bar
-    accepted = session.in_state(RunState.ACCEPTED)
+    accepted = session.accepted
     of_bar: Sequence[tuple[bool, str]] = [(True, "bar unknown")]
     if bar is not None:
         grows = bar.expansion_um_m_k != 0.0 and (bar.temp_c is None or bar.expansion_um_m_k is None)
@@ -65,13 +65,13 @@ def _early(session: SessionFolder) -> list[str]:
 def sealed_after(session: SessionFolder) -> list[tuple[RunEntry, timedelta]]:
     """Return accepted runs with the time from start to seal; a virtual machine has a separate clock."""
     at = {} if session.virtual or session.seal is None else sealed_at(session.folder)
-    runs = session.in_state(RunState.ACCEPTED) if at else ()
+    runs = session.accepted if at else ()
     dated = [(run, run.started, at.get(run.key)) for run in runs]
     return [(run, sealed - began) for run, began, sealed in dated if began is not None and sealed is not None]
 
 
 def _dates(session: SessionFolder) -> Iterator[str]:
-    moments = [run.started for run in session.in_state(RunState.ACCEPTED) if run.started is not None]
+    moments = starts_of(session.accepted)
     if not moments:
         return
     first, last, bar = min(moments), max(moments), session.bar

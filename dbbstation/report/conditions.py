@@ -6,7 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from dbbstation.facts.digits import to_its_place
-from dbbstation.files.formats.session import RunState
+from dbbstation.files.formats.session import starts_of
 from dbbstation.files.recordings.event_log import anchor_of
 from dbbstation.report.certificate import sealed_after
 
@@ -23,8 +23,8 @@ _NOT_NOTED = "not noted"
 
 def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: str) -> tuple[tuple[str, str], ...]:
     """Return each condition's name and value; a missing value is "not noted"."""
-    compensated = sum(1 for run in session.in_state(RunState.ACCEPTED) if run.program is not None)
-    accepted = len(session.in_state(RunState.ACCEPTED))
+    compensated = sum(1 for run in session.accepted if run.program is not None)
+    accepted = len(session.accepted)
     return (
         ("machine", session.machine.name),
         ("serial number", session.serial_number or _NOT_NOTED),
@@ -74,7 +74,7 @@ ANCHOR_SHOWN = 16
 
 def when_measured(runs: Iterable[RunEntry]) -> str:
     """Return first and last start, in words."""
-    moments = [run.started for run in runs if run.started is not None]
+    moments = starts_of(runs)
     if not moments:
         return _NOT_NOTED
     first, last = min(moments), max(moments)
@@ -82,7 +82,7 @@ def when_measured(runs: Iterable[RunEntry]) -> str:
 
 
 def _instrument(session: SessionFolder) -> str:
-    read = [run.instrument for run in session.in_state(RunState.ACCEPTED)]
+    read = [run.instrument for run in session.accepted]
     told = dict.fromkeys(
         "virtual: " * one.virtual + one.text for one in read or [session.instrument] if one is not None
     )
@@ -122,7 +122,7 @@ def _bar(bar: Bar | None, waiver: str) -> tuple[tuple[str, str], ...]:
 
 def _shop(session: SessionFolder) -> str:
     before = _degc(session.ambient_temp_c)
-    last = max((run.started for run in session.runs if run.started is not None), default=None)
+    last = max(starts_of(session.runs), default=None)
     after = [
         note for note in session.notes if note.ambient_temp_c is not None and last is not None and note.made >= last
     ]

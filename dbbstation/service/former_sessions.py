@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.files.atomic import write_bytes
-from dbbstation.files.formats.session import RunState
 from dbbstation.files.gateway import content_of, digest_of
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
@@ -73,7 +72,7 @@ def before_and_now(folder: Path) -> BeforeAndNow:
 
 def in_force(session: SessionFolder, models: dict[str, Path]) -> InForce:
     """Return the programs that commanded a session's accepted circles."""
-    runs = session.in_state(RunState.ACCEPTED)
+    runs = session.accepted
     programs = [run.program for run in runs if run.program is not None]
     used = sorted({program.model_sha256 for program in programs if program.model_sha256})
     return InForce(

@@ -12,7 +12,6 @@ import numpy as np
 
 from dbbstation.computing.arrays import largest_size
 from dbbstation.errors import StationError, TraceError
-from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
 from dbbstation.station.events import RunId
@@ -189,7 +188,7 @@ def last_traces(folder: Path, test: str) -> dict[Direction, LiveTrace]:
         return {}
     _, session = formers[0]
     traces = {}
-    for run in session.in_state(RunState.ACCEPTED):
+    for run in session.accepted:
         if run.test != test:
             continue
         try:

@@ -9,7 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from dbbstation.errors import OutputError
 from dbbstation.facts.quantities import TemperatureDegc
-from dbbstation.files.formats.session import Note
+from dbbstation.files.formats.session import Note, starts_of
 from dbbstation.files.recordings.lock import PATIENCE_S
 from dbbstation.files.recordings.session_writer import SessionWriter
 
@@ -38,7 +38,7 @@ def add_note(folder: Path, text: str = "", degc: float | None = None) -> None:
     """
     with SessionWriter.open(folder, PATIENCE_S) as writer:
         # On a virtual machine that runs faster than real time, runs and notes bear times ahead of the present.
-        runs = [run.started for run in writer.runs if run.started is not None]
+        runs = starts_of(writer.runs)
         notes = [note.made for note in writer.session.notes]
         writer.note(Note(max([datetime.now(UTC), *runs, *notes]), text, degc))
 

@@ -154,7 +154,7 @@ class RunJudge:
         former, read = self._former, {}
         if former is None:
             return None
-        runs = [run for run in former.in_state(RunState.ACCEPTED) if run.program is None]
+        runs = [run for run in former.accepted if run.program is None]
         for entry in runs:
             with suppress(InputError, TraceError):
                 form_um = coefficients_um(cut(former.load(entry).recording, circle := former.circle(entry)))

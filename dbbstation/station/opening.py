@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import InputError, Problem, refuse
 from dbbstation.files.formats.machine import machine_data
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
-from dbbstation.files.formats.session import RunState
+from dbbstation.files.formats.session import starts_of
 from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.event_log import CLOCK_S, EVENTS_FILE
 from dbbstation.files.recordings.session_writer import SessionWriter
@@ -46,7 +46,7 @@ def check_session(
     if plan_data(plan) != plan_data(read_inline_plan(session.plan_path)):
         what = "the plan of this session is another one"
         faults.append(Problem.of(session.plan_path, what, "give its plan file, or another --out"))
-    other = [run for run in session.in_state(RunState.ACCEPTED) if (run.program is not None) is not with_programs]
+    other = [run for run in session.accepted if (run.program is not None) is not with_programs]
     if other:
         was, now = ("plain circles", "NC programs") if with_programs else ("NC programs", "plain circles")
         what = f"its runs were commanded by {was}, now {now} are asked for"
@@ -108,7 +108,7 @@ def changed_since(session: SessionFolder, details: SessionDetails) -> Iterator[A
     known = [session.ambient_temp_c, *(note.ambient_temp_c for note in session.notes)]
     if details.ambient_temp_c not in {None, next((one for one in reversed(known) if one is not None), None)}:
         yield AddNote(ambient_temp_c=details.ambient_temp_c)
-    noted = [run.started for run in session.runs if run.started is not None] + [note.made for note in session.notes]
+    noted = starts_of(session.runs) + [note.made for note in session.notes]
     if session.virtual or not noted:
         return
     since_s = (datetime.now(UTC) - max(noted)).total_seconds()

@@ -9,10 +9,9 @@ import numpy as np
 
 from dbbstation.circles.analysis import analyse, analyse_pair, refiltered
 from dbbstation.circles.budget import SetUpKnowledge
-from dbbstation.computing.counted import uncounted
+from dbbstation.computing.counted import counting, uncounted
 from dbbstation.computing.grouped import grouped
 from dbbstation.errors import TraceError
-from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.judged import judge_session
 from dbbstation.results.circles import Circled, MeasuredCircle, MeasuredPair
 from dbbstation.tasks.load import no_run_left, with_tests
@@ -59,20 +58,18 @@ def load_circles(
     pairs: list[MeasuredPair] = []
     warnings: list[str] = []
     for session in sessions:
-        accepted = session.in_state(RunState.ACCEPTED)
+        accepted = session.accepted
         used = [run for run in accepted if (not tests or run.test in tests) and run.test not in exclude]
         read = session.load_all(accepted if findings else used)
         recordings = {run.path: file.recording for run, file in zip(accepted if findings else used, read, strict=True)}
         judged = judge_session(session, [(run, recordings[run.path]) for run in accepted], model) if findings else ()
         judgements = {run.path: judgement for run, judgement in zip(accepted, judged, strict=False)}
         of_session = []
-        for done, run in enumerate(used):
-            progress(done, len(used))
+        for run in counting(used, progress):
             circle = _measured(session, run, recordings[run.path], chosen, judgements.get(run.path))
             of_session.append(circle)
             if circle.problem:
                 warnings.append(f"{session.name}: run {run.label} shows no circle: {circle.problem}")
-        progress(len(used), len(used))
         circles += of_session
         pairs += _pairs(session, of_session)
         warnings += _many(session, used)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dbbstation.computing.counted import counting
 from dbbstation.errors import InputError, OutputError, TraceError, read_each
 from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.files.atomic import streamed, write_text
@@ -108,8 +109,7 @@ def blocks(what: Exporting, progress: Counted, say: Callable[[str], None]) -> It
     Raises:
         InputError: a run cannot be read.
     """
-    for done, (session, run) in enumerate(what.runs):
-        progress(done, len(what.runs))
+    for session, run in counting(what.runs, progress):
         try:
             read, circle = session.load(run), session.circle(run)
         except InputError as error:
@@ -147,7 +147,6 @@ def blocks(what: Exporting, progress: Counted, say: Callable[[str], None]) -> It
             name: list(texts.get(name) or [""] * count) if what.is_text(name) else numbers.get(name, none)
             for name in what.names
         }
-    progress(len(what.runs), len(what.runs))
 
 
 def write_csv(path: Path, what: Exporting, read: Blocks, provenance: Callable[[], Provenance], *, force: bool) -> int:

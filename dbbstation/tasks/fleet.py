@@ -14,6 +14,7 @@ from dbbstation.facts.serialise import read_plain
 from dbbstation.files.atomic import streamed, write_bytes
 from dbbstation.files.csv_rows import table_csv
 from dbbstation.files.fleet_folder import FleetFolder
+from dbbstation.files.formats.session import starts_of
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book, note_known
 from dbbstation.files.keys import files_of_session, key_of, program_identity
@@ -112,7 +113,7 @@ class _Named:
     @property
     def started(self) -> str | None:
         """Return the earliest noted start of a run."""
-        moments = () if self.session is None else [run.started for run in self.session.runs if run.started is not None]
+        moments = () if self.session is None else starts_of(self.session.runs)
         return min(moments).isoformat() if moments else None
 
 

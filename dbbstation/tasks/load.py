@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.computing.counted import uncounted
+from dbbstation.computing.counted import counting, uncounted
 from dbbstation.errors import InputError, Problem, StationError, refuse
 from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.files.recordings.session import SessionFolder, opened
@@ -126,12 +126,11 @@ def load_sessions(
     readings: dict[bytes, SessionFolder] = {}
     copied: Counter[tuple[Path, Path]] = Counter()
     for session in sessions:
-        wanted = [run for run in session.in_state(RunState.ACCEPTED) if run.test not in exclude]
+        wanted = [run for run in session.accepted if run.test not in exclude]
         unjudged = session.in_state(RunState.COMPLETE, RunState.RECORDING)
         warnings += [f"{session.name}: run {run.label} is {run.state}, not accepted: left out" for run in unjudged]
         logged: list[tuple[float, Recording]] = []
-        for done, run in enumerate(wanted):
-            progress(done, len(wanted))
+        for run in counting(wanted, progress):
             try:
                 # One recording at a time is in memory; its turn is what stays.
                 read = session.load(run)
@@ -151,7 +150,6 @@ def load_sessions(
                 problems += error.problems
             except StationError as error:
                 problems.append(Problem.of(run.path, error.what, error.remedy))
-        progress(len(wanted), len(wanted))
         warnings += _under_spindle(session, wanted)
         logs[session.name] = [*logged, *_left_out(session, exclude)] if logged else []
     problems += [
@@ -241,7 +239,7 @@ def _thermometer(name: str, runs: Sequence[tuple[float, Recording]]) -> Thermome
 
 def _left_out(session: SessionFolder, exclude: Sequence[str]) -> list[tuple[float, Recording]]:
     found = []
-    for run in session.in_state(RunState.ACCEPTED):
+    for run in session.accepted:
         began = session.started_s(run)
         if run.test not in exclude or began is None:
             continue

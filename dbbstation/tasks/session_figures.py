@@ -12,6 +12,7 @@ from dbbstation.circles.budget import budgets
 from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.circles.path import TOLERATED
 from dbbstation.files.formats.model import read_model
+from dbbstation.files.formats.session import starts_of
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book
 from dbbstation.files.own_sources import every_source
@@ -45,7 +46,7 @@ def session_figures(folder: Path) -> SessionFigures:
         found = load_circles([folder], TOLERATED)
     session = found.sessions[0]
     runs = run_figures(found.shown)
-    moments = [one.entry.started for one in found.circles if one.entry.started is not None]
+    moments = starts_of(one.entry for one in found.circles)
     return SessionFigures(
         name=session.name,
         sha256=session.sha256,

@@ -8,7 +8,7 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import residuals
 from dbbstation.calibration.reporting.evaluation import LowPassedCircularity
-from dbbstation.computing.counted import uncounted
+from dbbstation.computing.counted import counting, uncounted
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.harmonics import smooth_of
 from dbbstation.model.machine_model import MachineModel
@@ -43,13 +43,11 @@ def predicted_circles(
     nominal = residuals(MachineModel(model.machine), observations)
     left = residuals(model.of_the_machine(), observations)
     circles: list[LowPassedCircularity] = []
-    for o, before, after in zip(observations, nominal, left, strict=True):
-        progress(len(circles), len(observations))
+    for o, before, after in counting(list(zip(observations, nominal, left, strict=True)), progress):
         raw, bar_mm = o.raw, o.raw.circle.bar_mm
         lengths_mm = [raw.length_mm, raw.length_mm - after, bar_mm + before, bar_mm + after]
         circle = LowPassedCircularity(*smooth_circularities_um(raw, lengths_mm))
         circles.append(circle)
-    progress(len(circles), len(observations))
     return tuple(circles)
 
 

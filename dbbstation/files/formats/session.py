@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from pathlib import Path, PurePosixPath
@@ -162,6 +162,11 @@ class RunEntry(Record):
     def label(self) -> str:
         """Return the name of the run for messages."""
         return f"{self.test} {self.direction} {self.repeat}"
+
+
+def starts_of(runs: Iterable[RunEntry]) -> list[Moment]:
+    """Return the known starts of runs."""
+    return [run.started for run in runs if run.started is not None]
 
 
 def _unsealed(run: RunEntry) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.formats.session import RunState
+from dbbstation.files.formats.session import starts_of
 from dbbstation.files.gateway import head_of
 from dbbstation.files.places import SESSION_FILE, real_path, text_of_name
 from dbbstation.files.recordings.session import parse_session
@@ -32,8 +32,8 @@ def former_sessions(
     now: SessionFolder, under: Path, tests: set[str] | None = None
 ) -> list[tuple[datetime, SessionFolder]]:
     """Return earlier sessions of the same machine, plan and jig, the latest first. A real session gets only real ones, a virtual session only virtual ones."""
-    accepted = now.in_state(RunState.ACCEPTED)
-    began = min((run.started for run in accepted if run.started is not None), default=None)
+    accepted = now.accepted
+    began = min(starts_of(accepted), default=None)
     tests = tests or {run.test for run in accepted} or set(now.plan.tests)
     found = []
     for _, folder in dated_folders(under):
@@ -45,8 +45,8 @@ def former_sessions(
         )  # not `read_session`: a virtual neighbour would mark this session's outputs
         if then is None or faults:
             continue  # the list of sessions says what is wrong with it
-        runs = then.in_state(RunState.ACCEPTED)
-        ended = max((run.started for run in runs if run.started is not None), default=None)
+        runs = then.accepted
+        ended = max(starts_of(runs), default=None)
         measured = {run.test for run in runs}
         if ended is not None and (began is None or ended < began) and tests <= measured and _alike(now, then, tests):
             found.append((ended, then))

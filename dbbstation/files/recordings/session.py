@@ -13,7 +13,7 @@ from dbbstation.errors import Faults, InputError, Problem, TraceError, read_each
 from dbbstation.facts.quantities import Quantity
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
-from dbbstation.files.formats.session import PART, RunEntry, RunState, SessionDetails, SessionFile
+from dbbstation.files.formats.session import PART, RunEntry, RunState, SessionDetails, SessionFile, starts_of
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import open_book
 from dbbstation.files.places import SESSION_FILE, name_of
@@ -89,6 +89,11 @@ class SessionFolder(SessionDetails):
         """Return the runs in these states, with repeats in numerical order."""
         return repeats_in_order(run for run in self.runs if run.state in states)
 
+    @property
+    def accepted(self) -> tuple[RunEntry, ...]:
+        """Return the accepted runs, as `in_state`."""
+        return self.in_state(RunState.ACCEPTED)
+
     def circle(self, run: RunEntry) -> Circle:
         """Return a run's commanded circle, with its programmed centre."""
         circle = self.plan.tests[run.test].run(run.direction)
@@ -123,7 +128,7 @@ class SessionFolder(SessionDetails):
 
     def started_s(self, run: RunEntry) -> float | None:
         """Return a run's start after the first one's [s]; None if not noted."""
-        moments = [other.started for other in self.runs if other.started is not None]
+        moments = starts_of(self.runs)
         return None if run.started is None else (run.started - min(moments)).total_seconds()
 
     @cached_property

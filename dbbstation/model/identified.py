@@ -86,13 +86,6 @@ class IdentifiedModel:
         variance = np.diag(self.covariance) - (0.0 if self.formula_variance is None else self.formula_variance)
         return dict(zip(self.covariance_rows, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
 
-    def of_machine(self, u: Mapping[Row, float | None]) -> Iterator[tuple[str, Parameter, float, float | None]]:
-        """Yield source, parameter, value and uncertainty of each of the machine's parameters."""
-        for fitted in self.model.of_the_machine().sources:
-            for parameter, value in zip(fitted.source.parameters(self.model.machine), fitted.values, strict=True):
-                known = u.get((fitted.source.name, fitted.shared, parameter.name))
-                yield fitted.source.name, parameter, float(value), known
-
     @property
     def why_unknown(self) -> str:
         """Return why a value's uncertainty is unknown."""
@@ -102,6 +95,16 @@ class IdentifiedModel:
         if self.null_space is None:
             return f"an older program wrote the model, which does not say what this changes: {lost}"
         return f"the recordings do not determine: {lost}"
+
+
+def values_of_machine(
+    model: MachineModel, u: Mapping[Row, float | None]
+) -> Iterator[tuple[str, Parameter, float, float | None]]:
+    """Yield source, parameter, value and uncertainty of each of the machine's parameters."""
+    for fitted in model.of_the_machine().sources:
+        for parameter, value in zip(fitted.source.parameters(model.machine), fitted.values, strict=True):
+            known = u.get((fitted.source.name, fitted.shared, parameter.name))
+            yield fitted.source.name, parameter, float(value), known
 
 
 def known_u(variance: Floats, along: Floats) -> Floats:

@@ -11,6 +11,7 @@ from dbbstation.circles.budget import BudgetTerm
 from dbbstation.facts.digits import to_its_place
 from dbbstation.facts.serialise import as_objects
 from dbbstation.machine.geometry import differences, in_words
+from dbbstation.model.identified import values_of_machine
 from dbbstation.report.certificate import certified
 from dbbstation.report.conditions import conditions, identity, when_measured
 from dbbstation.report.polar import CIRCLE, SIZE, Polar, cured_polars, polar
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
 def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tuple[str, str, str, str, str], ...]:
     """Return rows of source, parameter, value, U and unit; a dash for unknown U."""
     rows = []
-    for source, parameter, value, u in identified.of_machine(identified.uncertainties):
+    for source, parameter, value, u in values_of_machine(identified.model, identified.uncertainties):
         shown = (f"{value:.5g}", "-") if u is None else to_its_place(value, coverage_factor * u)
         rows.append((source, parameter.name, *shown, parameter.unit))
     return tuple(rows)

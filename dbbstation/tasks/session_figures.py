@@ -19,6 +19,7 @@ from dbbstation.files.own_sources import every_source
 from dbbstation.files.recordings.event_log import anchor_of
 from dbbstation.history.order import moment_words
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
+from dbbstation.model.identified import values_of_machine
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.tolerances import tolerated_circles
@@ -150,7 +151,8 @@ def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures
 
 def machine_parameters(identified: IdentifiedModel) -> tuple[ModelParameter, ...]:
     """Return the machine's parameters, with uncertainties of differences between sessions."""
+    known = identified.uncertainties_between_sessions
     return tuple(
         _as_printed(ModelParameter(source, one.name, value, u or None, one.unit))  # zero: held at nominal
-        for source, one, value, u in identified.of_machine(identified.uncertainties_between_sessions)
+        for source, one, value, u in values_of_machine(identified.model, known)
     )

@@ -98,7 +98,7 @@ def _print_parameters(result: CalibrationResult) -> None:
                 u, expanded = each * uncertainty, COVERAGE_FACTOR * each * uncertainty
                 cells = [f"{number:.{decimals_of(expanded)}f}" for number in (each * value, u, expanded)]
             rows.append([source.name, name.removesuffix("_mm").replace("_", " "), *cells, unit])
-    print_table(["source", "parameter", "value", "u", EXPANDED, "unit"], rows)
+    print_table(f"source, parameter, value, u, {EXPANDED}, unit", rows)
 
 
 SAID_OF_SCATTER = {

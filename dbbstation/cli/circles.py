@@ -111,7 +111,7 @@ def _print_budgets(result: CirclesResult) -> None:
                 taken = abs(budget.as_read_um - budget.value_um)
                 rows.append([*name, "added by noise, taken off", f"{taken:.3f}"])
     echo("\nstandard uncertainties u [µm]")
-    print_table(["test", "dir", "n", "figure", "term", "u"], rows)
+    print_table("test, dir, n, figure, term, u", rows)
     echo(f"not stated, and therefore not in U: {', '.join(not_stated(result))}")
 
 
@@ -131,7 +131,7 @@ def _print_findings(runs: Sequence[CircleFiguresResult | RunWithoutCircle]) -> N
         for run, finding in found
     ]
     echo("\nfindings")
-    print_table(["test", "dir", "n", "finding", "value", "limit", "unit", "verdict"], rows)
+    print_table("test, dir, n, finding, value, limit, unit, verdict", rows)
     wrong = [
         f"{run.test} {run.direction} {run.repeat}: {finding.name}: {finding.text}"
         for run, finding in found
@@ -161,4 +161,4 @@ def _print_quick_looks(looks: Sequence[QuickLookResult]) -> None:
             )
     echo(f"\nquick look at the signatures of serial axes, {EXPANDED}")
     echo("On a hexapod these are symptoms, no causes: it has no axes X and Y. Causes: `dbbstation diagnose`.")
-    print_table(["test", "dir", "n", "signature", "at", "value", "U", "unit", "seen", ""], rows)
+    print_table("test, dir, n, signature, at, value, U, unit, seen, ", rows)

@@ -38,7 +38,7 @@ def _print_runs(result: ComparisonResult) -> None:
     echo(
         "B minus A [µm], largest first; found: rms of the found difference; sigmas: size in standard deviations; u: standard uncertainty by noise, balls and bars"
     )
-    titles = ["test", "dir", "n", "found", "sigmas", "rms", "noise", "centre x", "y", "u", "mean", "u", "G", "peak"]
+    titles = "test, dir, n, found, sigmas, rms, noise, centre x, y, u, mean, u, G, peak, at deg, "
     rows = [
         [
             run.test,
@@ -59,7 +59,7 @@ def _print_runs(result: ComparisonResult) -> None:
         ]
         for run in result.runs
     ]
-    print_table([*titles, "at deg", ""], rows)
+    print_table(titles, rows)
 
 
 def _tenths(value: float) -> str:
@@ -86,7 +86,7 @@ def _print_causes(result: ComparisonResult) -> None:
             ]
             for cause in there
         ]
-        titles = ["cause", "verdict", "probability", "gain in", "µm rms", "share", "opposite", "calibration", "where"]
+        titles = "cause, verdict, probability, gain in, µm rms, share, opposite, calibration, where"
         print_table(titles, rows)
         for cause in there:
             if cause.text:

@@ -142,10 +142,10 @@ def parameters(
             [one.way, _um(one.rms_um), _um(one.largest_um), f"{one.tilt_rms_deg:.5f}", f"{one.tilt_largest_deg:.5f}"]
             for one in result.left
         ]
-        print_table(["control", "rms", "largest", "tilt rms", "tilt largest"], rows)
+        print_table("control, rms, largest, tilt rms, tilt largest", rows)
         echo("\neach source alone, without and with parameters and tables [µm rms]:")
         print_table(
-            ["source", "alone", "left", "held by"],
+            "source, alone, left, held by",
             [[one.name, _um(one.rms_um), _um(one.left_rms_um), one.held_by] for one in result.sources],
         )
         _print("INI file", result.ini)

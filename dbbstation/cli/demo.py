@@ -133,7 +133,7 @@ def _print_ways(ways: Sequence[ControlWay]) -> None:
             [run.circularity_30_upr_um.measured for run in way.runs],
         )
         rows.append([way.way, *(f"{sum(each) / len(each):.2f}" for each in sizes), f"{way.seconds:.1f} s"])
-    print_table(["way", "centre", "mean radial error", "G", "time"], rows)
+    print_table("way, centre, mean radial error, G, time", rows)
     echo("faultless: a machine without errors, measured with the same bar, balls and holders")
     echo(G_LOW_PASSED)
 

@@ -48,7 +48,7 @@ def print_effects(effects: Sequence[CauseEffect]) -> None:
         ]
         for rank, one in enumerate(effects, start=1)
     ]
-    print_table(["", "cause", "verdict", "G", "U", "centres", "U", "workspace", "U", "G measured", "without it"], rows)
+    print_table(", cause, verdict, G, U, centres, U, workspace, U, G measured, without it", rows)
     echo("contributions of opposing causes need not add up to the measured value")
     for rank, one in enumerate(effects, start=1):
         echo(f"{rank}. {one.cause}: {one.cure}")
@@ -194,15 +194,9 @@ def _print_sources(sources: Sequence[SourceFinding]) -> None:
         gain = None if source.gain is None else round(source.gain)
         alike = ", ".join(source.ambiguous_with or source.equivalent[1:])
         rows.append([source.name, source.verdict, probability_text(source.probability), gain, hidden, again, alike])
-    titles = [
-        "cause",
-        "verdict",
-        "probability",
-        "log Bayes factor",
-        "concealed (R²)",
-        "selection frequency",
-        "not distinguished from",
-    ]
+    titles = (
+        "cause, verdict, probability, log Bayes factor, concealed (R²), selection frequency, not distinguished from"
+    )
     print_table(titles, rows)
     named = [source for source in sources if source.verdict in SAID]
     if named:

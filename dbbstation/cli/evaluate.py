@@ -49,7 +49,7 @@ def _print_predicted(runs: Sequence[EvaluatedRun]) -> None:
         share = f"{100 * off / circular.measured:.0f}" if circular.measured else "-"
         rows.append([*run.key, circular.measured, circular.predicted, off, share])
     echo("circular deviation G up to 30 undulations per revolution [µm]")
-    print_table(["test", "dir", "n", "measured", "predicted", "difference", "%"], rows)
+    print_table("test, dir, n, measured, predicted, difference, %", rows)
 
 
 evaluate = command(task, show, more=lambda: {"tolerances": shop_settings().tolerances})

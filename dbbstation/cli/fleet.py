@@ -130,7 +130,7 @@ def _print(result: FleetResult) -> None:
     rows = [
         [one.machine, one.session, one.state, (one.problem or one.headline).splitlines()[0]] for one in result.sessions
     ]
-    print_table(["machine", "session", "state", "result"], rows)
+    print_table("machine, session, state, result", rows)
     echo()
     echo(headline_of(result))
     comparison = result.comparison

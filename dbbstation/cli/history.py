@@ -55,7 +55,7 @@ def _print(machine: MachineHistoryResult, found: HistoryResult) -> None:
     for line in changes_in_words(machine, found.coverage_factor):
         echo(f"  {line}")
     echo(f"\n{EXPANDED}; level: since the last change")
-    titles = ["quantity", "unit", "n", "last", "U", "limit", "", "level", "U", "verdict", "since", "by", "U"]
+    titles = "quantity, unit, n, last, U, limit, , level, U, verdict, since, by, U"
     print_table(titles, [_row(one, found.coverage_factor) for one in machine.quantities])
 
 

@@ -91,9 +91,7 @@ def _print_sources(sources: Sequence[DriveFinding]) -> None:
         ]
         for s in sources
     ]
-    print_table(
-        ["cause", "verdict", "probability", "log Bayes factor", "concealed (R²)", "not distinguished from"], rows
-    )
+    print_table("cause, verdict, probability, log Bayes factor, concealed (R²), not distinguished from", rows)
     for source in sources:
         if source.verdict in SAID:
             echo()

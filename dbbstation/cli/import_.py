@@ -353,9 +353,7 @@ def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], unknown: Sequ
 def _show(found: ImportedSession) -> None:
     from dbbstation.trace.columns import LENGTH, TIME
 
-    print_table(
-        ["column", "means", "unit"], [[name, one.means, one.unit] for name, one in found.mapping.columns.items()]
-    )
+    print_table("column, means, unit", [[name, one.means, one.unit] for name, one in found.mapping.columns.items()])
     echo()
     rows = []
     for one in found.runs:
@@ -364,7 +362,7 @@ def _show(found: ImportedSession) -> None:
         rows.append(
             [Path(one.file).name, one.name, str(len(t_s)), f"{t_s[-1] - t_s[0]:.2f}", span, one.run.state.value]
         )
-    print_table(["file", "run", "samples", "t [s]", "length [mm]", "state"], rows)
+    print_table("file, run, samples, t [s], length [mm], state", rows)
     details = found.details
     bar = "not known" if details.bar is None else f"{details.bar.calibrated_length_mm:.4f} mm"
     temp = "not known" if details.ambient_temp_c is None else f"{details.ambient_temp_c:g} degC"

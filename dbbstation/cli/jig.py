@@ -144,7 +144,7 @@ def sheet(
     ]
 
     def words() -> None:
-        print_table(["ball", "x [mm]", "y [mm]", "z [mm]", "u [µm]", "dx [µm]", "dy [µm]", "dz [µm]"], rows)
+        print_table("ball, x [mm], y [mm], z [mm], u [µm], dx [µm], dy [µm], dz [µm]", rows)
         if lost:
             echo(f"balls that the sheet lacks, left out of the new file: {', '.join(lost)}")
         if cmm_temp_c is None:

@@ -80,7 +80,7 @@ def _print(result: MismatchResult) -> None:
     _print_first(result)
     echo("\n".join((*result.sentences(), "")))
     print_table(
-        ["variable", "kind", "unit", "from", "to"],
+        "variable, kind, unit, from, to",
         [[v.name, v.kind, v.unit or "none", f"{v.low:.5g}", f"{v.high:.5g}"] for v in result.variables],
     )
     echo()
@@ -254,7 +254,7 @@ def _print_terms(there: Sequence[PortTerm]) -> None:
         ]
         for f in there
     ]
-    print_table(["term", "verdict", "probability", "log Bayes factor", "concealed", "parts with a gain"], rows)
+    print_table("term, verdict, probability, log Bayes factor, concealed, parts with a gain", rows)
     for f in there:
         print_finding(f, MOST_VALUES_OF_TERM, f" ({f.about})" if f.about else "")
 
@@ -274,7 +274,7 @@ def _print_refitted(parameters: Sequence[RefittedOfSimulator]) -> None:
         ]
         for p in parameters
     ]
-    print_table(["parameter", "stated", "refitted", "corrected", "unit", "concealed it"], rows)
+    print_table("parameter, stated, refitted, corrected, unit, concealed it", rows)
     for p in parameters:
         alike = p.not_told_apart_from
         if alike is not None:

@@ -67,9 +67,14 @@ def json_text(data: Mapping[str, object], indent: int | None = None) -> str:
     return json.dumps(data, indent=indent, allow_nan=False).replace("\x7f", "\\u007f")
 
 
-def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Print rows under titles, numbers aligned right, texts left."""
+def print_table(titles: str | Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Print rows under titles, numbers aligned right, texts left.
+
+    Args:
+        titles: one each, or one text with commas between.
+    """
     texts = [[_text(cell) for cell in row] for row in rows]
+    titles = words(titles) if isinstance(titles, str) else titles
     columns = list(zip(titles, *texts, strict=True))
     numeric = [all(_is_number(text) for text in column[1:] if text) for column in columns]
     widths = [max(map(len, column)) for column in columns]
@@ -185,7 +190,7 @@ def print_tolerances(held: Sequence[EvaluatedTolerance], origin: str) -> None:
                 *(t for pair in worst for t in pair),
             ]
         )
-    print_table(["quantity", "circles", "at most", "nominal machine", "", "model", ""], rows)
+    print_table("quantity, circles, at most, nominal machine, , model, ", rows)
 
 
 def _told(worst: WorstRun | None) -> tuple[str, str]:

@@ -80,7 +80,7 @@ def list_runs(folder: _Folder) -> Answer:
     ]
 
     def words() -> None:
-        print_table(["run", "started", "mounting", "state", "samples", "why"], rows)
+        print_table("run, started, mounting, state, samples, why", rows)
         for circle, count in _repeated(read):
             echo(f"{circle} has {count} accepted runs: all of them count")
         echo(f"no accepted run: {', '.join(missing)}" if missing else "every test of the plan has an accepted run")
@@ -236,7 +236,7 @@ def log(folder: _Folder) -> Answer:
     def words() -> None:
         if events:
             rows = [[k, _at(one.at), one.what, told[k - 1]] for k, one in enumerate(events, start=1)]
-            print_table(["event", "at", "what", "about"], rows)
+            print_table("event, at, what, about", rows)
         echo(f"anchor {events[-1].link}" if events else "no event log; `dbbstation session seal` begins one")
 
     return Answer(SessionEvents(read.name, listed, events[-1].link if events else None), words)

@@ -135,7 +135,7 @@ def _print(found: Settings) -> None:
         value = NOT_SET if one.value is None else str(one.value).replace("\t", "tab")
         value = re.sub(r"\b[0-9a-f]{64}\b", lambda hashed: f"{hashed[0][:12]}…", value)
         rows.append([key, value, one.origin])
-    print_table(["setting", "value", "from"], rows)
+    print_table("setting, value, from", rows)
     for held in result.tolerances:
         circles = which_circles(held.tests, held.directions)
         filtered = "" if held.filter is None else f" (filter: {held.filter})"

@@ -62,7 +62,7 @@ def sources(
         for source in known.values()
     ]
     every = SourcesResult(tuple(source_description(source) for source in known.values()))
-    return Answer(every, lambda: print_table(["cause", "belongs to", "role", "what it is"], rows))
+    return Answer(every, lambda: print_table("cause, belongs to, role, what it is", rows))
 
 
 def _details(told: SourceDescription) -> list[str]:

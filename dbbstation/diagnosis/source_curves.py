@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.calibration.reporting.residual_map import names_of_tests
+from dbbstation.computing.grouped import grouped
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.drawn import Branch, GainOfTest, SourceCurves, Trace
 from dbbstation.diagnosis.parts import BY_DIRECTION
@@ -207,9 +208,7 @@ def gains_by_test(diagnosis: Diagnosis) -> tuple[GainOfTest, ...]:
     before, after = diagnosis.before, diagnosis.after
     rounds = [_circularity_um(before), _circularity_um(after)]
     names = names_of_tests(before.observations)
-    rows: dict[str, list[int]] = {}
-    for k, name in enumerate(names):
-        rows.setdefault(name, []).append(k)
+    rows = grouped((name, k) for k, name in enumerate(names))
     return tuple(
         GainOfTest(
             name=name,

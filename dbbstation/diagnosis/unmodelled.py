@@ -11,6 +11,7 @@ from scipy.fft import next_fast_len
 from scipy.linalg import qr
 
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
+from dbbstation.computing.grouped import grouped
 from dbbstation.diagnosis.parts import ALIKE
 from dbbstation.diagnosis.shapes import (
     BALL,
@@ -301,10 +302,7 @@ class Unmodelled:
         self._looked_for -= names
 
     def _add(self, more: Sequence[Shape]) -> None:
-        families: dict[str, list[Shape]] = {}
-        for shape in more:
-            families.setdefault(_name(shape), []).append(shape)
-        families = {name: family for name, family in families.items() if name not in self.follows}
+        families = grouped((name, shape) for shape in more if (name := _name(shape)) not in self.follows)
         more = [shape for family in families.values() for shape in family]
         if not more:
             return

@@ -15,7 +15,7 @@ from dbbstation.model.identified import values_of_machine
 from dbbstation.report.certificate import certified
 from dbbstation.report.conditions import conditions, identity, when_measured
 from dbbstation.report.polar import CIRCLE, SIZE, Polar, cured_polars, polar
-from dbbstation.results.circles import RunWithoutCircle, circles_result, not_stated, why_not
+from dbbstation.results.circles import NO_CIRCLES, RunWithoutCircle, circles_result, not_stated, why_not
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
 from dbbstation.results.report import (
     CertificateState,
@@ -100,7 +100,7 @@ class Reported:
     chosen: Filter
     settings: Settings
     coverage_factor: float
-    before: Circled | None = None
+    before: Circled = NO_CIRCLES
     modelled: Modelled | None = None
     job: str = ""
     ranked: Ranked | None = None
@@ -116,8 +116,8 @@ def numbers_of(reported: Reported, page: str) -> ReportResult:
     modelled, ranked = reported.modelled, reported.ranked
     identified = None if modelled is None else modelled.identified
     former = reported.before
-    before = () if former is None else tolerated_circles(former.shown, tolerances)
-    before_both = (*before, *(() if former is None else tolerated_pairs(former.pairs, tolerances)))
+    before = tolerated_circles(former.shown, tolerances)
+    before_both = (*before, *tolerated_pairs(former.pairs, tolerances))
     measured = tuple(side_by_side(now, before))
     held = tuple(compared(one, now_both, before_both, coverage_factor) for one in tolerances)
     return ReportResult(
@@ -169,7 +169,7 @@ def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance
         "polars": _polars(reported),
         "ranking": reported.ranked,
         "cured": [] if reported.ranked is None else cured_polars(reported.ranked),
-        "before_name": "" if reported.before is None else reported.before.sessions[0].name,
+        "before_name": reported.before.sessions[0].name if reported.before.sessions else "",
         "several": len(found.sessions) > 1,
         "findings": _findings(found),
         "not_stated": not_stated(numbers.circles),
@@ -216,7 +216,7 @@ def _sessions(reported: Reported, bad: set[str]) -> Iterable[dict[str, object]]:
 
 
 def _notes_before(reported: Reported) -> list[str]:
-    if reported.before is None:
+    if not reported.before.sessions:
         return []
     one, other = reported.before.sessions[0].machine, reported.found.sessions[0].machine
     unlike = differences(one, other)
@@ -225,7 +225,7 @@ def _notes_before(reported: Reported) -> list[str]:
 
 
 def _polars(reported: Reported) -> list[Polar]:
-    before = () if reported.before is None else reported.before.shown
+    before = reported.before.shown
     tests = dict.fromkeys((one.session, one.entry.test) for one in reported.found.shown)
     several = len(reported.found.sessions) > 1
     return [
@@ -270,7 +270,7 @@ def _budget(circles: CirclesResult) -> dict[str, object] | None:
 
 def _files(reported: Reported, provenance: Provenance) -> Iterable[tuple[str, str]]:
     yield from provenance.inputs.items()
-    for found in (reported.found, *(() if reported.before is None else (reported.before,))):
+    for found in (reported.found, reported.before):
         for one in found.circles:
             yield f"{one.session}/runs/{one.entry.path.name}", one.entry.sha256
             if one.entry.program is not None:

@@ -269,17 +269,14 @@ def _bars(part: SubFigure, diagnosis: Diagnosis, gains: Sequence[GainOfTest], *,
     _pairs(panels[1], names, [one.circularity_um for one in gains], found=found)
     labelled(panels[1], "", "µm", "circularity left of each test")
     whole = (rms_um(diagnosis.before.residual_mm), rms_um(diagnosis.after.residual_mm))
-    _pairs(panels[2], ["residual", "tests left out,\npredicted"], [whole, _held_out_um(diagnosis)], found=found)
+    before, after = diagnosis.held_out
+    held_out = (1e3 * before.rms, 1e3 * after.rms)
+    _pairs(panels[2], ["residual", "tests left out,\npredicted"], [whole, held_out], found=found)
     labelled(panels[2], "", "µm rms", "all tests")
     for axes in panels[:2]:
         axes.set_xlabel("test")
     heading(part, "residual, circularity, prediction")
     part.legend(*panels[0].get_legend_handles_labels(), loc="upper right", ncols=3, borderpad=0.0)
-
-
-def _held_out_um(diagnosis: Diagnosis) -> tuple[float, float]:
-    before, after = diagnosis.held_out
-    return 1e3 * before.rms, 1e3 * after.rms
 
 
 def _pairs(axes: Axes, names: Sequence[str], values: Sequence[tuple[float, float]], *, found: bool) -> None:

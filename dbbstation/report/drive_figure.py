@@ -14,6 +14,7 @@ from dbbstation.results.frame import OnePanel
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.findings import DriveFindings
 
 MOST_POINTS = 3000
@@ -36,26 +37,29 @@ def drive_figure(diagnosis: DriveFindings, wanted: Wanted = FigureFormat.SVG) ->
         return in_format(figure, wanted)
 
 
+def _thinned(diagnosis: DriveFindings) -> dict[str, Floats]:
+    step = max(len(diagnosis.table["t_s"]) // MOST_POINTS, 1)
+    return {name: column[::step] for name, column in diagnosis.table.items()}
+
+
 def _force(axes: Axes, diagnosis: DriveFindings) -> None:
-    table = diagnosis.table
-    t, step = table["t_s"], max(len(table["t_s"]) // MOST_POINTS, 1)
+    table = _thinned(diagnosis)
     lines = (
         ("measured", "force_n"),
         ("mass and viscous friction", "base_force_n"),
         (_named(diagnosis), "model_force_n"),
     )
     for colour, (label, column) in zip((MEASURED, BEFORE, AFTER), lines, strict=True):
-        axes.plot(t[::step], table[column][::step], color=colour, label=label, linewidth=0.8)
+        axes.plot(table["t_s"], table[column], color=colour, label=label, linewidth=0.8)
     axes.axvspan(*diagnosis.held_back.t_s, color="#eeeeee", zorder=0)
     labelled(axes, "", "force, N", "force in the band of the comparison; grey: held back")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3)
 
 
 def _left(axes: Axes, diagnosis: DriveFindings) -> None:
-    table = diagnosis.table
-    t, step = table["t_s"], max(len(table["t_s"]) // MOST_POINTS, 1)
+    table = _thinned(diagnosis)
     for colour, column in zip((BEFORE, AFTER), ("base_force_n", "model_force_n"), strict=True):
-        axes.plot(t[::step], (table["force_n"] - table[column])[::step], color=colour, linewidth=0.8)
+        axes.plot(table["t_s"], table["force_n"] - table[column], color=colour, linewidth=0.8)
     errors = diagnosis.held_back.relative_force_error
     axes.axvspan(*diagnosis.held_back.t_s, color="#eeeeee", zorder=0)
     labelled(

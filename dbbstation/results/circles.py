@@ -225,6 +225,9 @@ class Circled:
         return [one for one in self.circles if one.analysis is not None]
 
 
+NO_CIRCLES = Circled((), (), (), ())
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CirclesResult(Framed):
     """Figures of measured circles after ISO 230-4, as in `circles --json`.

@@ -98,6 +98,7 @@ def report(
     from dbbstation.machine.geometry import check_model_is_of
     from dbbstation.report.content import Reported, certified_of, content_of, numbers_of
     from dbbstation.report.html import chromium, printed, report_html
+    from dbbstation.results.circles import NO_CIRCLES
     from dbbstation.tasks.circle_runs import load_circles
     from dbbstation.tasks.models import model_of, sources_known
     from dbbstation.tasks.reporting import logo_of, modelled_runs, ranked_causes, read_runs
@@ -114,7 +115,7 @@ def report(
     found = load_circles(
         now, TOLERATED, tests, exclude, findings=True, model=identified, progress=telling.counted("circles")
     )
-    former = None if then is None else load_circles([then], TOLERATED, progress=telling.counted("circles before"))
+    former = NO_CIRCLES if then is None else load_circles([then], TOLERATED, progress=telling.counted("circles before"))
     modelled = ranked = None
     if identified is not None:
         for session in found.sessions:

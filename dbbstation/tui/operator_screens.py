@@ -9,6 +9,7 @@ from textual.containers import Vertical, VerticalScroll
 from textual.content import Content
 from textual.widgets import Footer, Static
 
+from dbbstation.service.choice import Choice
 from dbbstation.station.states import State
 from dbbstation.tui import texts
 from dbbstation.tui.board_screen import RunScreen
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from textual.binding import BindingType
     from textual.widgets import OptionList
 
-    from dbbstation.service.choice import Choice, Prepared
+    from dbbstation.service.choice import Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.operated import Answered, JobAnswer, Operated
     from dbbstation.tui.app import StationApp
@@ -42,7 +43,7 @@ class JobScreen(FrontScreen):
     def __init__(self, reception: StationApp, front: Front, operated: Operated) -> None:
         super().__init__(reception, front)
         self._operated = operated
-        self._choice: Choice | None = None
+        self._choice = Choice()
 
     def on_mount(self) -> None:
         self.search()
@@ -52,8 +53,6 @@ class JobScreen(FrontScreen):
         self.do(self._operated.choice, self._found)
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
-        if self._choice is None:
-            return
         name = self._rows[self.at]
         if name == _ANEW:
             self.say(texts.START_LOOKS)
@@ -68,8 +67,7 @@ class JobScreen(FrontScreen):
 
     @property
     def _rows(self) -> tuple[str, ...]:
-        goes_on = self._choice is not None and self._choice.goes_on
-        return (_BEGIN, *((_ANEW,) if goes_on else ()), *self._operated.job.may_change)
+        return (_BEGIN, *((_ANEW,) if self._choice.goes_on else ()), *self._operated.job.may_change)
 
     def _begin(self, choice: Choice) -> None:
         lacking = [texts.JOB_ROWS[name] for name in self._operated.job.required if not self._value(name).strip()]
@@ -95,7 +93,7 @@ class JobScreen(FrontScreen):
         return prepared
 
     def _typed(self, name: str, text: str | None) -> None:
-        if text is None or self._choice is None:
+        if text is None:
             return
         if name == "port":
             self._choice = replace(self._choice, line=self._choice.line.model_copy(update={"port": text}))
@@ -108,8 +106,6 @@ class JobScreen(FrontScreen):
         self._show()
 
     def _value(self, name: str) -> str:
-        if self._choice is None:
-            return ""
         if name == "port":
             return self._choice.line.port
         if name == "temperature":
@@ -119,13 +115,11 @@ class JobScreen(FrontScreen):
 
     def _found(self, choice: Choice) -> None:
         # What was typed for the session before holds for the next: the operator is the same.
-        operator = choice.operator if self._choice is None else self._choice.operator
+        operator = choice.operator if self._choice.folder is None else self._choice.operator
         self._choice = replace(choice, operator=operator)
         self._show()
 
     def _show(self) -> None:
-        if self._choice is None:
-            return
         job, choice = self._operated.job, self._choice
         begin = "Go on with session" if choice.goes_on else "Begin: session"
         name = "" if choice.folder is None else choice.folder.name

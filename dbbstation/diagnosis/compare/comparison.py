@@ -11,6 +11,7 @@ from scipy.special import expit, logsumexp
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES
 from dbbstation.calibration.fit.methods import CENTRED_MM
+from dbbstation.computing.grouped import grouped
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.compare.channel import channel_of
 from dbbstation.diagnosis.compare.findings import DirectionHalves, EffectOfCause, LargestEffect, RunDifference
@@ -310,9 +311,7 @@ def opposite_share(sides: Sides, by_run: list[Floats]) -> float:
 
 def both_directions(pairs: Sequence[Pair]) -> list[tuple[int, int]]:
     """Return the runs of tests measured in both directions."""
-    by_test: dict[tuple[str, int], list[int]] = {}
-    for k, pair in enumerate(pairs):
-        by_test.setdefault((pair.test, pair.number), []).append(k)
+    by_test = grouped(((pair.test, pair.number), k) for k, pair in enumerate(pairs))
     return [(runs[0], runs[1]) for runs in by_test.values() if len(runs) == 2]  # noqa: PLR2004
 
 

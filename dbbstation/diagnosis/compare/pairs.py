@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.grouped import grouped
 from dbbstation.diagnosis.shapes import variables
 from dbbstation.errors import TraceError
 from dbbstation.facts.quantities import FULL_TURN_DEG
@@ -192,10 +193,7 @@ def _mean(runs: Sequence[Observation], sectors: int) -> Floats:
 
 
 def _by_run(runs: Sequence[Observation]) -> dict[tuple[str, str], list[Observation]]:
-    found: dict[tuple[str, str], list[Observation]] = {}
-    for run in runs:
-        found.setdefault((run.test, str(run.raw.circle.direction)), []).append(run)
-    return found
+    return grouped(((run.test, str(run.raw.circle.direction)), run) for run in runs)
 
 
 def _unlike(runs: Sequence[Observation]) -> str:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from dbbstation.files.checking import Checked
-    from dbbstation.results.checked import CheckedFile, CheckResult, DryRunResult, SampledPlanResult
+    from dbbstation.results.checked import CheckedFile, DryRunResult, SampledPlanResult
     from dbbstation.sources.contract import ErrorSource
 
 
@@ -91,6 +91,7 @@ def check(
         raise click.UsageError("name at least one file or session folder")
 
     from dbbstation.files.own_sources import every_source
+    from dbbstation.results.checked import CheckResult
 
     known = every_source(source_files)
     results = [_check_one(file, known) for file in files]
@@ -112,7 +113,8 @@ def check(
     problems = [problem for result in results for problem in result.problems]
     problems += [problem for run in runs for problem in run.problems]
     if as_json:
-        print_result(_result(results, runs, seen, problems))
+        checked, warnings = map(_file, results), (warning for result in results for warning in result.warnings)
+        print_result(CheckResult(tuple(checked), tuple(runs), tuple(seen), tuple(problems), tuple(warnings)))
     else:
         _print(results, runs)
         for one in seen:
@@ -129,23 +131,6 @@ def _hold_against(results: Sequence[Checked], anchor: str | None) -> None:
             folder = result.path if result.path.is_dir() else result.path.parent
             told = anchor_told(folder, anchor)
             (result.problems if told.remedy else result.warnings).append(told)
-
-
-def _result(
-    results: Sequence[Checked],
-    runs: Sequence[DryRunResult],
-    seen: Sequence[SampledPlanResult],
-    problems: Sequence[Problem],
-) -> CheckResult:
-    from dbbstation.results.checked import CheckResult
-
-    return CheckResult(
-        files=tuple(_file(result) for result in results),
-        dry_runs=tuple(runs),
-        sampling=tuple(seen),
-        problems=tuple(problems),
-        warnings=tuple(warning for result in results for warning in result.warnings),
-    )
 
 
 def _file(result: Checked) -> CheckedFile:

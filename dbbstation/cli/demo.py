@@ -151,12 +151,8 @@ _CONTENTS = (
 
 
 def _sizes(run: DemoCircle) -> tuple[tuple[float, float], ...]:
-    before, after = run.before, run.after
-    return (
-        (before.centre_deviation_um, after.centre_deviation_um),
-        (before.mean_radial_error_um, after.mean_radial_error_um),
-        (before.circularity_30_upr_um, after.circularity_30_upr_um),
-    )
+    names = ("centre_deviation_um", "mean_radial_error_um", "circularity_30_upr_um")
+    return tuple((getattr(run.before, name), getattr(run.after, name)) for name in names)
 
 
 def _means(runs: Sequence[DemoCircle]) -> list[float]:

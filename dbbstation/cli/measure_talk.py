@@ -54,13 +54,24 @@ _ASKED_TO_GO_BACK = "Enter: go back to the circle that is wrong   a WHY: accept 
 _ASKED_OF_WRONG = "Enter: repeat   a WHY: accept all the same   x: reject   q: quit"
 
 
-class Talk:
+class _Doubts:
+    """What is wrong with the last circle, or with earlier ones."""
+
+    _wrong = _back = False
+
+    def doubt(self, event: events.Event) -> None:
+        """Note what an event says of it."""
+        if isinstance(event, events.RunCompleted):
+            self._wrong, self._back = bool(event.wrong), False
+        self._back = self._back or isinstance(event, events.RunDoubted)
+
+
+class Talk(_Doubts):
     """Prints the events for the operator; an observer."""
 
     def __init__(self, *, asking: bool) -> None:
         self._asking = asking
         self._bar = ProgressBar("  recording", COUNTED, unit="°", passing=True)
-        self._wrong = self._back = False
         self._centre = _OF_MACHINE
 
     def __call__(self, event: events.Event) -> None:
@@ -75,9 +86,7 @@ class Talk:
             self._bar.end()
         for line in lines:
             echo(line, err=True)
-        if isinstance(event, events.RunCompleted):
-            self._wrong, self._back = bool(event.wrong), False
-        self._back = self._back or isinstance(event, events.RunDoubted)
+        self.doubt(event)
         if self._asking and isinstance(event, events.StateChanged) and event.state in _ASKED:
             of_wrong = _ASKED_TO_GO_BACK if self._back else _ASKED_OF_WRONG
             doubtful = (self._wrong or self._back) and event.state is State.COMPLETE
@@ -147,14 +156,13 @@ class Summary:
         )
 
 
-class Keyboard:
+class Keyboard(_Doubts):
     """Turns input lines into commands by the station's state; an observer."""
 
     def __init__(self, send: Callable[[Command], None], lines: TextIO | None = None) -> None:
         self._send = send
         self._lines = lines or sys.stdin
         self._state = State.BETWEEN
-        self._wrong = self._back = False
         # A thread that waits for a line cannot be woken; as a daemon it ends with the program.
         self._thread = threading.Thread(target=self._listen, name="keyboard", daemon=True)
 
@@ -164,12 +172,9 @@ class Keyboard:
 
     def __call__(self, event: events.Event) -> None:
         """Note the station's state."""
+        self.doubt(event)
         if isinstance(event, events.StateChanged):
             self._state = event.state
-        elif isinstance(event, events.RunCompleted):
-            self._wrong, self._back = bool(event.wrong), False
-        elif isinstance(event, events.RunDoubted):
-            self._back = True
 
     def _on_enter(self) -> Command | None:
         if self._state is State.COMPLETE:

@@ -116,9 +116,7 @@ def reject(folder: _Folder, run: _Run, *, reason: _Reason) -> Answer:
     Examples:
       dbbstation session reject 2026-11-20-hexapod-7 a-cw-2 --reason "chip under the holder"
     """
-    if not reason.strip():
-        raise click.UsageError("give the reason with --reason, for later readers of the session")
-    return _told(run, _judged(folder, run, accepted=False, reason=reason.strip()))
+    return _told(run, _judged(folder, run, accepted=False, reason=_stated(reason)))
 
 
 @made("take-in", session)
@@ -165,15 +163,14 @@ def amend(
     """
     from dbbstation.files.recordings.amending import amend as noted
 
-    if not reason.strip():
-        raise click.UsageError("give the reason with --reason, for later readers of the session")
-    found = noted(folder, reason.strip(), made=datetime.now(UTC).replace(microsecond=0), plan=plan, machine=machine)
+    reason, now = _stated(reason), datetime.now(UTC).replace(microsecond=0)
+    found = noted(folder, reason, made=now, plan=plan, machine=machine)
     changed = [
         {"what": one.what, "former_sha256": one.former_sha256, "sha256": one.sha256, "former": one.former or None}
         for one in found
     ]
     words = [f"{one.what}: amended" + (f", as it was: {one.former}" if one.former else "") for one in found]
-    return Answer({"session": str(folder), "reason": reason.strip(), "changed": changed}, words)
+    return Answer({"session": str(folder), "reason": reason, "changed": changed}, words)
 
 
 @made(group=session)
@@ -259,6 +256,12 @@ def rebuild(folder: _Folder) -> Answer:
     kept = f"; as it was: {former}" if former else ""
     told = {"session": str(folder), "events": events, "former": former or None}
     return Answer(told, [f"session file written from {events} events{kept}"])
+
+
+def _stated(reason: str) -> str:
+    if not reason.strip():
+        raise click.UsageError("give the reason with --reason, for later readers of the session")
+    return reason.strip()
 
 
 def _at(moment: datetime | None) -> str:

@@ -192,17 +192,12 @@ UNEVEN_STOP_S = 0.6
 """Possible variation of the total stop between runs [s]: none, or 0.3 s at each corner."""
 
 
-def no_circle(one: Seen) -> tuple[Finding, ...]:
-    """Return the findings of a recording without circle."""
-    whole = Finding(Name.CIRCLE, None, None, "", FindingVerdict.WRONG, one.problem)
-    shown = feed(one, Others())
-    return (whole, lost_samples(one), *((shown,) if shown.wrong else ()))
-
-
 def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
     """Return all findings that need neither an expected place nor a counterpart."""
     if one.analysis is None:
-        return no_circle(one)
+        whole = Finding(Name.CIRCLE, None, None, "", FindingVerdict.WRONG, one.problem)
+        shown = feed(one, Others())
+        return (whole, lost_samples(one), *((shown,) if shown.wrong else ()))
     expected = one.run.expected
     if not one.alone:
         reversals = () if expected is None else expected.reversals_deg

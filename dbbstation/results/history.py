@@ -231,7 +231,10 @@ def history_result(
 
 
 def _machine(one: MachineHistory, coverage_factor: float) -> MachineHistoryResult:
-    sessions = [_session(session) for session in one.sessions]
+    sessions = [
+        HistorySession(session.name, None if session.started is None else session.started.isoformat(), session.sha256)
+        for session in one.sessions
+    ]
     chart = one.chart
     return MachineHistoryResult(
         machine=one.machine,
@@ -243,11 +246,6 @@ def _machine(one: MachineHistory, coverage_factor: float) -> MachineHistoryResul
         changes=tuple(_changes(one, sessions)),
         quantities=tuple(_quantity(trend, sessions, coverage_factor) for trend in one.trends),
     )
-
-
-def _session(session: SessionFigures) -> HistorySession:
-    started = None if session.started is None else session.started.isoformat()
-    return HistorySession(session.name, started, session.sha256)
 
 
 def _changes(one: MachineHistory, sessions: Sequence[HistorySession]) -> Iterator[HistoryChange]:

@@ -174,11 +174,11 @@ def mismatch_result(
             for v in compared.variables
         ),
         mismatch=found.is_there,
-        offset=_offset(found),
+        offset=found.offset and OffsetResult(**vars(found.offset), significant=found.offset_is_there),
         noise=_noise(found),
         residual_rms=ResidualRms(found.rms_before, found.rms_after),
         held_out="not-tested" if found.held_out is None else "tested",
-        held_out_rms=_held_out(found),
+        held_out_rms=found.held_out and of_facts(HeldOutRms, found.held_out, worse=found.is_worse),
         findings=tuple(replace(one, text=sentence_of(found, one)) for one in found.findings),
         parameters=found.fitted,
         next=next_measurements(found),
@@ -187,13 +187,6 @@ def mismatch_result(
         drawing=drawing,
         notes=notes,
     )
-
-
-def _offset(found: Mismatch) -> OffsetResult | None:
-    if found.offset is None:
-        return None
-    known = found.offset
-    return OffsetResult(known.value, known.uncertainty, known.unit, found.offset_is_there)
 
 
 def _noise(found: Mismatch) -> NoiseResult:
@@ -212,10 +205,3 @@ def _noise(found: Mismatch) -> NoiseResult:
             for one in (settled, *settled.others)
         ),
     )
-
-
-def _held_out(found: Mismatch) -> HeldOutRms | None:
-    held_out = found.held_out
-    if held_out is None:
-        return None
-    return HeldOutRms(held_out.as_simulated, held_out.before, held_out.after, found.is_worse, held_out.folds)

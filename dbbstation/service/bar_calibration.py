@@ -133,8 +133,7 @@ class BarCalibration:
         self.done = 0
         self._wanted: tuple[Mapping[str, object], Mapping[str, object], Path] | None = None
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="bar", daemon=True)
-        self._thread.start()
+        self._listen()
 
     @property
     def busy(self) -> bool:
@@ -147,13 +146,16 @@ class BarCalibration:
             self.failure, self.found, self.done = None, None, 0
             self._wanted = of_bar, calibrator, path
             if not self._thread.is_alive():
-                self._thread = threading.Thread(target=self._run, name="bar", daemon=True)
-                self._thread.start()
+                self._listen()
 
     def close(self) -> None:
         """Give the instrument back."""
         self._stop.set()
         self._thread.join()
+
+    def _listen(self) -> None:
+        self._thread = threading.Thread(target=self._run, name="bar", daemon=True)
+        self._thread.start()
 
     def _run(self) -> None:
         try:

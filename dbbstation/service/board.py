@@ -301,17 +301,14 @@ class Board:
 
     def _enter(self, event: events.StateChanged) -> None:
         before, self.state, self.allowed = self.state, event.state, event.commands
-        if event.state is State.BETWEEN:
-            self._leave(before)
-        elif event.state in {State.STOPPED, State.FAULTED} and self._announced_mark is not Mark.ACCEPTED:
+        accepted = self._announced_mark is Mark.ACCEPTED
+        if event.state is State.BETWEEN and before in _RUN_MARKS and not accepted:
+            self._mark(Mark.PASSED)
+        elif event.state in {State.STOPPED, State.FAULTED} and not accepted:
             self._mark(Mark.OPEN)
         elif event.state in _RUN_MARKS:
             self._mark(_RUN_MARKS[event.state])
         self.running = self.announced.run.direction if self.announced and event.state is State.TURNING else None
-
-    def _leave(self, before: State | None) -> None:
-        if before is not None and before in _RUN_MARKS and self._announced_mark is not Mark.ACCEPTED:
-            self._mark(Mark.PASSED)
 
     @property
     def _announced_mark(self) -> Mark | None:

@@ -218,8 +218,7 @@ class AnswerScreen(ExplainedScreen):
     def action_read(self) -> None:
         self._back()
 
-    def action_back(self) -> None:
-        self._back()
+    action_back = action_read
 
     def _draw(self) -> None:
         answered = self._answered

@@ -16,7 +16,6 @@ from dbbstation.tui.texts import NOT_SEATED_LONG, NOT_SEATED_SHORT, SEATED, SEAT
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dbbstation.plan.plan import Circle
     from dbbstation.service.board import Board
     from dbbstation.station.detector import BarAtFeedIn
     from dbbstation.station.events import Sample
@@ -88,16 +87,12 @@ def _deviation(sample: Sample, board: Board) -> Content:
     if sample.length_mm is None or board.announced is None:
         return Content("")
     if board.state in _BEFORE_RUN:
-        return _seat(sample.length_mm, board.announced.circle)
+        found = seat(sample.length_mm, board.announced.circle)
+        return Content.styled(seat_words(found), "bold $text-success" if found.seated else "bold $text-warning")
     deviation_um = 1e3 * (sample.length_mm - board.announced.circle.bar_mm)
     if abs(deviation_um) > _FAR_UM:
         return Content("far off the circle")
     return Content(f"{deviation_um:+9.1f} µm")
-
-
-def _seat(length_mm: float, circle: Circle) -> Content:
-    found = seat(length_mm, circle)
-    return Content.styled(seat_words(found), "bold $text-success" if found.seated else "bold $text-warning")
 
 
 def _quality(sample: Sample, board: Board, old_s: float | None) -> list[Content]:

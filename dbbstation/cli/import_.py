@@ -194,14 +194,15 @@ def _result(found: ImportedSession, out: Path, *, written: bool) -> ImportResult
 
 def _with_conditions(asker: Asker, told: SessionOptions, not_known: Sequence[str]) -> SessionOptions:
 
-    if told.ambient_temp_c is None and "temperature" not in not_known:
+    asked_for = set(_unknown(told)) - set(not_known)
+    if "temperature" in asked_for:
         asked = asker.number("temperature of the shop [degC]", _or("--ambient-temp-c", "temperature"))
         told = replace(told, ambient_temp_c=asked)
-    if not told.operator and "operator" not in not_known:
+    if "operator" in asked_for:
         told = replace(told, operator=asker.text("who measured", _or("--operator", "operator"), default=""))
-    if not told.job and "job" not in not_known:
+    if "job" in asked_for:
         told = replace(told, job=asker.text("what it was measured for", _or("--job", "job"), default=""))
-    if told.bar is None and told.bar_length_mm is None and "bar" not in not_known:
+    if "bar" in asked_for:
         option = _or("--bar FILE, or --bar-length-mm with --bar-uncertainty-um", "bar")
         length_mm = asker.number("calibrated length of the bar [mm]", option)
         told = replace(told, bar_length_mm=length_mm)

@@ -26,6 +26,7 @@ from dbbstation.machine.statics import Load, platform_weight, strut_tensions
 from dbbstation.sources.contract import Effect
 from dbbstation.sources.laws.motion import since_turning
 from dbbstation.sources.laws.temperature import FOLLOWED_K, known_thermometers, logged_degc
+from dbbstation.text.written import words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -89,15 +90,9 @@ UNITS = {
 TEMPERATURES = tuple(name for name, unit in UNITS.items() if unit == "degC")
 """Variables logged by thermometers."""
 
-OF_STRUTS = (
-    "strut-length",
-    "strut-force",
-    "strut-speed-sign",
-    "strut-speed",
-    "strut-acceleration",
-    "time since its reversal",
-    "travel since its reversal",
-    "strut-temperature",
+OF_STRUTS = words(
+    "strut-length, strut-force, strut-speed-sign, strut-speed, "
+    "strut-acceleration, time since its reversal, travel since its reversal, strut-temperature"
 )
 """Variables with separate values for each strut."""
 

@@ -49,17 +49,14 @@ _SMALLEST_ROWS = 6
 """Least number of rows for text above and below the circle."""
 
 
+_PARTS = ("scale", "last", "ccw", "cw", "both", "label")
+"""Parts of the view that the style sheet colours."""
+
+
 class TraceView(Widget):
     """Deviation of the bar about the nominal circle, both directions in one dial."""
 
-    COMPONENT_CLASSES: ClassVar[set[str]] = {
-        "trace--scale",
-        "trace--last",
-        "trace--ccw",
-        "trace--cw",
-        "trace--both",
-        "trace--label",
-    }
+    COMPONENT_CLASSES: ClassVar[set[str]] = {f"trace--{part}" for part in _PARTS}
 
     def __init__(self, *, cell_aspect: float = CELL_ASPECT, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
@@ -196,9 +193,7 @@ class TraceView(Widget):
         return Strip(segments, len(row)).adjust_cell_length(wide, base)
 
     def _styles(self) -> dict[int, Style]:
-        scale, last, ccw, cw, both, label = (
-            self.get_component_rich_style(f"trace--{part}") for part in ("scale", "last", "ccw", "cw", "both", "label")
-        )
+        scale, last, ccw, cw, both, label = (self.get_component_rich_style(f"trace--{part}") for part in _PARTS)
         traces = {0: scale, _LAST: last}
         for member, style in ((_CCW, ccw), (_CW, cw), (_CCW | _CW, both)):
             traces |= {member: style, member | _LAST: style}

@@ -15,6 +15,7 @@ from dbbstation.files.recordings.dmis import Measured, read_dmis
 from dbbstation.files.recordings.foreign_csv import read_foreign
 from dbbstation.files.recordings.table_csv import NO_NUMBER, TableFile, missing_column
 from dbbstation.files.source_text import shortened
+from dbbstation.text.written import words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -265,7 +266,7 @@ _NAMES = {
 }
 _MEASURED = {"actual", "act", "ist", "istwert", "meas", "measured", "gemessen", "実測値", "測定値"}
 _NOT_MEASURED = set(
-    "nominal nom soll sollwert target 基準値 設計値 u dev deviation abweichung tol tolerance".split()  # noqa: SIM905 - words
+    words("nominal, nom, soll, sollwert, target, 基準値, 設計値, u, dev, deviation, abweichung, tol, tolerance")
 )
 """Words that, beside an axis, mark a column as no measured coordinate. Programs use `U` and `u` differently, so the user must name uncertainty columns."""
 

@@ -13,22 +13,23 @@ import numpy as np
 from dbbstation.computing.grouped import grouped
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.history.order import by_time
+from dbbstation.history.record import ModelFigures
 from dbbstation.history.run_length import chart_for
 from dbbstation.history.watch import not_watched, watch
 from dbbstation.plan.tolerance import CircleFigure
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.history.record import ModelFigures, SessionFigures
+    from dbbstation.history.record import SessionFigures
     from dbbstation.history.run_length import Chart
     from dbbstation.history.watch import Watched
     from dbbstation.plan.tolerance import Tolerance
 
-    _Series = list[tuple[int, float, float]]  # sessions, values, their u
+    _InSession = tuple["Subject", tuple[int, float, float]]  # session, value, its u
 
 FALSE_ALARMS = 1e-3
 """False alarms per session of a machine over all its quantities: one in a thousand sessions, or nineteen years of
@@ -148,7 +149,8 @@ def histories(
 def _history(
     machine: str, sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures], asked: TrendOptions
 ) -> MachineHistory:
-    series = _circle_series(sessions, asked) | _parameter_series(sessions, models)
+    circles = sorted(grouped(_of_circles(sessions, asked)).items(), key=lambda one: _order(one[0]))
+    series = dict(circles) | grouped(_of_parameters(sessions, models))
     numbers = {subject: tuple(map(np.array, zip(*one, strict=True))) for subject, one in series.items()}
     reasons = {subject: _why_not(subject, u) for subject, (_, _, u) in numbers.items()}
     count = sum(not reason for reason in reasons.values())
@@ -174,8 +176,7 @@ def _why_not(subject: Subject, u: Floats) -> str:
     return ""
 
 
-def _circle_series(sessions: Sequence[SessionFigures], asked: TrendOptions) -> dict[Subject, _Series]:
-    found: dict[Subject, _Series] = {}
+def _of_circles(sessions: Sequence[SessionFigures], asked: TrendOptions) -> Iterator[_InSession]:
     for k, session in enumerate(sessions):
         taken = (run for run in session.runs if asked.takes(run.test))
         runs = grouped(((run.test, run.direction, run.circle), run.figures) for run in taken)
@@ -186,21 +187,19 @@ def _circle_series(sessions: Sequence[SessionFigures], asked: TrendOptions) -> d
                     value = fmean(figures[place].value_um for figures in repeats)
                     # Averaging removes only independent errors; stated uncertainties are mostly errors common to repeats.
                     u = sqrt(fmean(figures[place].stated_u_um ** 2 for figures in repeats))
-                found.setdefault(Subject(figure.name, test, direction, circle), []).append((k, value, u))
-    order = sorted(found, key=lambda s: (s.test, s.direction, s.of, _FIRST.get(s.figure, len(_FIRST))))
-    return {subject: found[subject] for subject in order}
+                yield Subject(figure.name, test, direction, circle), (k, value, u)
 
 
-def _parameter_series(sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures]) -> dict[Subject, _Series]:
-    found: dict[Subject, _Series] = {}
-    for k, session in enumerate(sessions):
-        model = models.get(session.sha256)
-        for parameter in () if model is None else model.parameters:
-            beside = tuple(sorted(source for source in model.sources if source != parameter.source)) if model else ()
+def _order(one: Subject) -> tuple[str, str, str, int]:
+    return one.test, one.direction, one.of, _FIRST.get(one.figure, len(_FIRST))
+
+
+def _of_parameters(sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures]) -> Iterator[_InSession]:
+    for k, model in enumerate(models.get(session.sha256, ModelFigures("", "")) for session in sessions):
+        for parameter in model.parameters:
+            beside = tuple(sorted(source for source in model.sources if source != parameter.source))
             subject = Subject(parameter.name, "", "", parameter.source, parameter.unit, beside)
-            u = np.nan if parameter.u is None else parameter.u
-            found.setdefault(subject, []).append((k, parameter.value, u))
-    return found
+            yield subject, (k, parameter.value, np.nan if parameter.u is None else parameter.u)
 
 
 def _labels(subjects: Sequence[Subject]) -> dict[Subject, str]:

@@ -139,7 +139,7 @@ def _diagnosed(piece: FleetPiece) -> Done:
         FleetValue("cause" if source in of_causes else "parameter", *number)
         for source, *number in _numbers(result.model)
     ]
-    notes = (*result.notes, *(f"outlier, kept out of the fits: {one.text}" for one in result.outliers))
+    notes = (*result.notes, *map(outlier_sentence, result.outliers))
     found = FleetFound((*parameters, *figures), causes, headline, notes)
     return found, plain(result), {".yaml": model_text(result.model, _provenance(piece)).encode()}
 

@@ -151,7 +151,3 @@ def held(raw: RawCircle) -> Finding:
     limit = max(SHORTEST_S, most * median_of(np.diff(raw.t_s)))
     stated = f"the length stands still for {value:.1f} s at {place}"
     return found(Name.HELD, value, limit, "the length never stands still", stated)
-
-
-AFTER_HELD = "look after plunger, stroke and plug of the gauge, and repeat the run"
-"""Remedy for a constant length."""

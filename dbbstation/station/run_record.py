@@ -10,7 +10,8 @@ import numpy as np
 from dbbstation.errors import TraceError
 from dbbstation.facts.quantities import FULL_TURN_DEG
 from dbbstation.instrument.reading import DOUBTFUL, OK
-from dbbstation.quality.held import AFTER_HELD, SHORTEST_S, HeldLength
+from dbbstation.quality.finding import DO, Name
+from dbbstation.quality.held import SHORTEST_S, HeldLength
 from dbbstation.station.detector import DWELL_BEHIND_S, feed_out_due_s, live_phi_deg
 from dbbstation.station.events import Sample
 from dbbstation.trace.analysis import CircleFigures, figures
@@ -116,7 +117,7 @@ class RunRecord:
     def standing(self) -> str:
         """Return a sentence on a gauge that does not follow the machine."""
         stands = f"the length has stood at {self._last_mm:.4f} mm for {self.held.held_s:.1f} s"
-        return f"{stands} while the machine moved; {AFTER_HELD}"
+        return f"{stands} while the machine moved: {DO[Name.HELD]}"
 
     def left(self, t_s: float) -> bool:
         """Return whether enough time has passed since the feed-out."""

@@ -58,7 +58,7 @@ def test_a_length_that_sticks_on_the_turn_ends_the_run_within_two_seconds(plan: 
     completed, at_s = ended(plan, stuck(sound, 30.0))
     assert completed.figures is None
     assert "the length has stood at " in completed.problem
-    assert completed.problem.endswith("repeat the run")
+    assert completed.problem.endswith("run the circle again")
     assert at_s - 30.0 < 2.0
 
 

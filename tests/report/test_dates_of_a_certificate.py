@@ -63,7 +63,7 @@ START = datetime(2026, 11, 3, 8, tzinfo=UTC)
 
 def session(run, bar, calibrator, until=None):
     return SimpleNamespace(
-        in_state=lambda _state: [SimpleNamespace(started=datetime(*run, 8, tzinfo=UTC))],
+        accepted=[SimpleNamespace(started=datetime(*run, 8, tzinfo=UTC))],
         bar=Bar(
             "B-1",
             150.0,

@@ -60,7 +60,7 @@ def assertions(files: dict[str, str]) -> list[Assertion]:
 
 
 def _of_file(path: str, tree: ast.Module) -> Iterator[Assertion]:
-    of_file = "".join(map(ast.unparse, (node for node in tree.body if isinstance(node, ast.Assign))))
+    of_file = "\n".join(map(ast.unparse, (node for node in tree.body if isinstance(node, ast.Assign))))
     of_file = of_file if "pytestmark" in of_file else ""
     for function in ast.walk(tree):
         if not isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):

@@ -26,7 +26,7 @@ from dbbstation.sources.contract import Motion, Need, Setup
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.effects import WorkspaceError
     from dbbstation.diagnosis.explain import Explained
@@ -73,6 +73,10 @@ class Proposal:
         return ", ".join(parts)
 
 
+_Run = tuple["Circle", str, float]
+"""Circle, ball, and time after the last run."""
+
+
 class ForeseenTests:
     """Possible tests of a channel; what a run would show is computed once."""
 
@@ -80,7 +84,9 @@ class ForeseenTests:
         self.channel = channel
         self._ends_s = _ends_s(channel)
         self._samples = float(np.mean([len(o.raw) for o in channel.observations]))
-        self._readings: dict[tuple[Circle, float, str], BarReading] = {}
+        self._motions: dict[_Run, Motion] = {}
+        self._places: dict[tuple[Circle, str], BarReading] = {}
+        self._base: dict[_Run, tuple[Integers, Floats]] = {}
         self._columns: dict[tuple[object, ...], Floats] = {}
         self._is_reachable = cache(lambda circle: is_within_travel(channel.machine, circle.envelope(step_deg=15.0)))
 
@@ -121,17 +127,20 @@ class ForeseenTests:
 
         Its new mountings are eliminated.
         """
-        machine, layout, found = self.channel.machine, self.channel.calibration.layout, []
+        layout, found = self.channel.calibration.layout, []
         for direction in directions:
-            run = replace(proposal.circle, direction=direction), proposal.wait_s, proposal.observation.setup.ball
-            if run not in self._readings:
-                self._readings[run] = MachineModel(machine).bar(_motion(proposal, direction, self._ends_s))
-                self._columns[run] = by_terms(self._readings[run], layout, layout.nominal)
-            reading, parts = self._readings[run], [self._columns[run]]
+            run, reading = self._run(proposal, direction)
+            if run not in self._base:
+                base = by_terms(reading, layout, layout.nominal)
+                acting = np.flatnonzero(base.any(axis=0))
+                self._base[run] = acting, base[:, acting]
+            acting, base = self._base[run]
+            parts = [np.zeros((len(base), len(layout.nominal)))]
+            parts[0][:, acting] = base
             for source, variant in asked:
                 form = (*run, source.name, source.law, variant.nonlinear)
                 if form not in self._columns:
-                    self._columns[form] = by_amplitudes(reading, source, machine, variant.nonlinear)
+                    self._columns[form] = by_amplitudes(reading, source, self.channel.machine, variant.nonlinear)
                 own = self._columns[form]
                 # Values of other sessions and mountings do not affect this run.
                 parts.append(np.pad(own, ((0, 0), (0, len(variant.columns) - own.shape[1]))))
@@ -143,6 +152,20 @@ class ForeseenTests:
             found.append(np.zeros((min(len(rows), len(seen)), rows.shape[1])))
             found[-1][:, seen] = np.linalg.qr(rows[:, seen], mode="r")
         return np.vstack(found)
+
+    def _run(self, proposal: Proposal, direction: Direction) -> tuple[_Run, BarReading]:
+        """Return a proposal's run, with its reading on a motion of its own: what sources keep of a motion would fill the memory."""
+        circle, ball = replace(proposal.circle, direction=direction), proposal.observation.setup.ball
+        run = circle, ball, proposal.wait_s
+        if run not in self._motions:
+            self._motions[run] = _motion(proposal, direction, self._ends_s)
+        motion = replace(self._motions[run])
+        if (circle, ball) not in self._places:
+            there = MachineModel(self.channel.machine).bar(motion)
+            self._places[circle, ball] = replace(there, actual=replace(there.actual, motion=self._motions[run]))
+        # A machine without causes takes the same path at any time.
+        reading = self._places[circle, ball]
+        return run, replace(reading, actual=replace(reading.actual, motion=motion))
 
 
 def _ends_s(channel: CircleChannel) -> float:

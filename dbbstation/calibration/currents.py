@@ -14,6 +14,7 @@ from dbbstation.errors import CalibrationError
 from dbbstation.inference.harmonics import Noise, noise_of
 from dbbstation.inference.square_root import Block, Columns, Solution, compress, lost_directions, solve
 from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import inverse
 from dbbstation.sources.causes.drive_friction import MOTOR_OF_GAIN, PER_MOTOR, driven_directions
 from dbbstation.sources.contract import Effect, Fitted, Motion
 from dbbstation.sources.laws.weights import stated_loads
@@ -75,7 +76,7 @@ def motor_currents(model: MachineModel, motion: Motion) -> MotorCurrents:
     weighing = any(f.source.weighs_struts for f in model.sources)
     stated = replace(there.machine, strut_masses=None) if weighing else there.machine
     total = Effect(
-        load_n=stated_loads("drive-friction", stated, there.frames, there.hexapod),
+        load_n=stated_loads("drive-friction", stated, there.frames, inverse(there.hexapod, there.frames)),
         current_a=np.zeros(STRUTS),
     )
     for fitted in model.acting(motion):
@@ -305,8 +306,7 @@ def current_start(layout: Layout, channel: CurrentChannel | None) -> dict[str, F
     x = layout.nominal.copy()
     for term in layout.terms:
         if term.source.of_currents:
-            gains = [p.plausible if p.name in MOTOR_OF_GAIN else 0.0 for p in term.parameters]
-            x[term.columns] = gains
+            x[term.columns] = [p.plausible if p.name in MOTOR_OF_GAIN else 0.0 for p in term.parameters]
     for _ in range(MOST_STEPS):
         columns, solution = by_themselves(current_blocks(layout, channel, x), layout.known)
         step = layout.nominal[columns] + solution.x - x[columns]
@@ -385,9 +385,8 @@ def motor_findings(
         "circles": by_themselves(blocks[:circles], layout.known, noise.effective, nominal[:circles]),
         "currents": by_themselves(currents, layout.known),
     }
-    fitted = layout.fitted
     names = layout.names
-    open_columns = fitted[np.linalg.norm(solution.held, axis=0) > OPEN]
+    open_columns = layout.fitted[np.linalg.norm(solution.held, axis=0) > OPEN]
     held = frozenset(names[column][2] for column in open_columns if names[column][0] in _drives(layout))
     found = motor_noise(left)
     residual = tuple(_rms(of_motor) for of_motor in left)

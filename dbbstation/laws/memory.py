@@ -144,11 +144,8 @@ def driven(length_mm: Floats, time_s: Floats, constant_s: Floats, state: LoopSta
         time_s: shape (n,); rows within `SHORTEST_S` are one.
         constant_s: tau while y decreases and while it increases, shape (2, m); a negative tau leads by -tau dx/dt.
     """
-    lag, by_constant, memory = (
-        np.empty_like(length_mm),
-        np.empty((len(length_mm), 2, length_mm.shape[1])),
-        state.memory.copy(),
-    )
+    lag, memory = np.empty_like(length_mm), state.memory.copy()
+    by_constant = np.empty((len(length_mm), 2, length_mm.shape[1]))
     clock = np.array([state.rows, state.time_s, state.step_s])
     lengths, times = np.ascontiguousarray(length_mm), np.ascontiguousarray(time_s)
     _drive(lengths, times, constant_s, SHORTEST_S, clock, memory, lag, by_constant)

@@ -69,17 +69,13 @@ class _OfStruts(ErrorSource):
         return (*sizes, *self._form.shapes)
 
     def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        self.require(motion)
-        count = len(values) - len(self._form.shapes)
-        effects = self._effects(motion, machine, values[count:])
-        return Effect(strut_mm=np.einsum("nsp,ps->ns", effects, values[:count].reshape(-1, STRUTS)))
+        effects, sizes = self._effects(motion, machine, values)
+        return Effect(strut_mm=np.einsum("nsp,ps->ns", effects, sizes))
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        self.require(motion)
-        count = len(values) - len(self._form.shapes)
-        effects = self._effects(motion, machine, values[count:])
-        by_size = (effects[:, :, :, None] * np.eye(STRUTS)[:, None, :]).reshape(len(motion), STRUTS, count)
-        by_shape = [self._by_shape(motion, machine, values, count + k) for k in range(len(self._form.shapes))]
+        effects, sizes = self._effects(motion, machine, values)
+        by_size = (effects[:, :, :, None] * np.eye(STRUTS)[:, None, :]).reshape(len(motion), STRUTS, sizes.size)
+        by_shape = [self._by_shape(motion, machine, values, k) for k in range(sizes.size, len(values))]
         return Effect(strut_mm=np.concatenate([by_size, *(each[:, :, None] for each in by_shape)], axis=2))
 
     def _by_shape(self, motion: Motion, machine: Machine, values: Floats, which: int) -> Floats:
@@ -88,12 +84,18 @@ class _OfStruts(ErrorSource):
         more, less = (self.effect(motion, machine, values + way * step).strut_mm for way in (1.0, -1.0))
         return np.asarray((more - less) / (2.0 * step[which]))  # type: ignore[operator] # an effect of this class has lengths
 
-    def _effects(self, motion: Motion, machine: Machine, shapes: Floats) -> Floats:
-        """Return the effect of unit amplitudes, shape (n, 6, p) [mm]; parameters beyond a limit are set to it."""
+    def _effects(self, motion: Motion, machine: Machine, values: Floats) -> tuple[Floats, Floats]:
+        """Return the effect of unit amplitudes, shape (n, 6, p) [mm], and the amplitudes, shape (p, 6).
+
+        Parameters beyond a limit are set to it.
+        """
+        self.require(motion)
+        sizes, shapes = np.split(values, [len(values) - len(self._form.shapes)])
         columns = motion.once("moving columns", machine, lambda: moving_columns(motion, machine))
         point = [float(np.clip(value, *p.limits)) for p, value in zip(self._form.shapes, shapes, strict=True)]
         needed = [{name: columns[name][:, k] for name in self.of.needs} for k in range(STRUTS)]
-        return MM_PER_UM * np.stack([self._form.at(one, point) for one in needed], axis=1)
+        effects = np.stack([self._form.at(one, point) for one in needed], axis=1)
+        return MM_PER_UM * effects, sizes.reshape(-1, STRUTS)
 
 
 def moving_columns(motion: Motion, machine: Machine) -> dict[str, Floats]:

@@ -111,7 +111,7 @@ class DriveFriction(ErrorSource):
         time_s, length, place = driven_in_time(motion, machine)
         load = motion.load_n
         if load is None:
-            load = stated_loads(self.name, machine, motion.frames(machine), machine.hexapod)
+            load = stated_loads(self.name, machine, motion.frames(machine), motion.struts(machine))
         return load, -resistance(length, TURNED_OVER_MM)[0][place], speed_mm_s(time_s, length)[place]
 
 

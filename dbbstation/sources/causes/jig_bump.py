@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.sources.contract import MM_PER_UM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import MM_PER_UM, Effect, LinearSource, Motion, Need, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +18,7 @@ MOST_RUNS = 120
 """Most runs of a session after which a displacement is tried."""
 
 
-class JigBump(ErrorSource):
+class JigBump(LinearSource):
     """From one run on, all balls on the table have the same shift.
 
     One bump is more probable than many balls badly seated in one direction. Between both directions of a test it is
@@ -58,10 +58,6 @@ class JigBump(ErrorSource):
     def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:
         after = [_is_after(motion, nonlinear[0]) for motion in motions]
         return any(after) and not all(after)
-
-    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        self.require(motion)
-        return Effect(fixed_ball_mm=MM_PER_UM * values[:3] * float(_is_after(motion, values[3])))
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         self.require(motion)

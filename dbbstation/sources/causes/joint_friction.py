@@ -23,6 +23,8 @@ from dbbstation.sources.contract import (
 from dbbstation.sources.laws.weights import for_such_struts, strut_compliance
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Hexapod, Machine
     from dbbstation.machine.kinematics import Struts
@@ -105,21 +107,20 @@ class JointFriction(SourceWithHistory):
             other = resistance(joints.angle_rad, angle)[0] - acting
             outer, inner = drags(joints, other)
             parts.append(outer + inner)
-        compliance = strut_compliance(machine)
-        tensions = [strut_tensions(struts, transverse_load(struts, values[:, None] * part)) for part in parts]
-        return Effect(strut_mm=np.stack([stretch_mm(struts, compliance, tension) for tension in tensions], axis=-1))
+        return Effect(strut_mm=_stretched(machine, struts, (values[:, None] * part for part in parts)))
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         self.require(motion)
         struts = motion.struts(machine)
         drag, _ = friction_drag(struts, outer_axes(machine.hexapod))
-        by_joint = []
-        for i in range(STRUTS):
-            alone = np.zeros_like(drag)
-            alone[:, i] = drag[:, i]
-            tension = strut_tensions(struts, transverse_load(struts, alone))
-            by_joint.append(stretch_mm(struts, strut_compliance(machine), tension))
-        return Effect(strut_mm=np.stack(by_joint, axis=-1))
+        alone = (np.where(np.arange(STRUTS)[:, None] == i, drag, 0.0) for i in range(STRUTS))
+        return Effect(strut_mm=_stretched(machine, struts, alone))
+
+
+def _stretched(machine: Machine, struts: Struts, drags: Iterable[Floats]) -> Floats:
+    """Return the stretch of the struts under each drag, shape (n, 6, p) [mm]."""
+    tensions = (strut_tensions(struts, transverse_load(struts, drag)) for drag in drags)
+    return np.stack([stretch_mm(struts, strut_compliance(machine), tension) for tension in tensions], axis=-1)
 
 
 def outer_axes(hexapod: Hexapod) -> Floats:

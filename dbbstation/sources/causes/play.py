@@ -9,13 +9,6 @@ from scipy.special import erf
 
 from dbbstation.laws.play import EQUATION, FORM_UNCERTAINTY, PlayState, followed, leaning
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.statics import (
-    motor_loads,
-    platform_weight,
-    strut_tensions,
-    transverse_load,
-    transverse_pull,
-)
 from dbbstation.sources.contract import (
     MM_PER_UM,
     SMOOTH_MM,
@@ -31,7 +24,7 @@ from dbbstation.sources.contract import (
     of_each_strut,
     of_own_strut,
 )
-from dbbstation.sources.laws.weights import platform_masses
+from dbbstation.sources.laws.weights import platform_masses, stated_loads
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
@@ -152,9 +145,4 @@ def _spread_n(values: Floats) -> float:
 
 def _tensions(motion: Motion, machine: Machine) -> Floats:
     """Return the drives' loads, positive if they pull, shape (n, 6) [N]."""
-    masses = platform_masses(Play.name, machine)
-    frames, struts = motion.frames(machine), motion.struts(machine)
-    load = platform_weight(frames, masses)
-    if machine.strut_masses is not None:
-        load += transverse_load(struts, transverse_pull(struts, machine.strut_masses))
-    return motor_loads(struts, strut_tensions(struts, load), machine.strut_masses)
+    return stated_loads(Play.name, machine, motion.frames(machine), motion.struts(machine))

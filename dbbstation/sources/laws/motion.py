@@ -25,11 +25,8 @@ def driven_in_time(motion: Motion, machine: Machine) -> tuple[Floats, Floats, In
     time_s = np.asarray(motion.time_s)
     length = motion.struts(machine).length_mm
     later = np.diff(time_s) > SHORTEST_S
-    return (
-        time_s[np.append(later, True)],
-        length[np.append(later, True)],
-        np.concatenate([[0], np.cumsum(later)]),
-    )
+    last = np.append(later, True)
+    return time_s[last], length[last], np.concatenate([[0], np.cumsum(later)])
 
 
 def speed_mm_s(time_s: Floats, length_mm: Floats) -> Floats:

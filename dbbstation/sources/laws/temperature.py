@@ -64,8 +64,7 @@ class FollowsTemperature(LinearSource):
         cls._of = cause()
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        warmer_k = self.warmer_k(motion)
-        return _times(self._of.per_growth(motion, machine), warmer_k)
+        return _times(self._of.per_growth(motion, machine), self.warmer_k(motion))
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         return (self.growth,)
@@ -125,14 +124,8 @@ def chosen(
 
 def following_thermometers(sources: Sequence[ErrorSource], motions: Iterable[Motion]) -> tuple[ErrorSource, ...]:
     """Replace sources by their laws over thermometers, if all runs have these thermometers."""
-    return tuple(_logged(source, motions) or source for source in sources)
-
-
-def _logged(source: ErrorSource, motions: Iterable[Motion]) -> ErrorSource | None:
-    form = source.by_temperature()
-    if form is None or not_given(form, motions):
-        return None
-    return form
+    forms = ((source, source.by_temperature()) for source in sources)
+    return tuple(source if form is None or not_given(form, motions) else form for source, form in forms)
 
 
 def not_given(source: ErrorSource, motions: Iterable[Motion]) -> str:
@@ -206,12 +199,18 @@ class WarmsUp(ErrorSource):
         )
 
     def grown(self, motion: Motion, values: Floats) -> Floats:
-        """Return the growth at every sample, shape (n,)."""
-        return grown(motion, values)
+        """Return the growth at every sample in the unit of the parameters, shape (n,)."""
+        growth, constant_s, loss = values
+        law: Floats = growth * warmed(_time_s(motion), constant_s) - loss * _paused(motion, constant_s, warmed)
+        return law
 
     def grown_by(self, motion: Motion, values: Floats) -> Floats:
         """Return derivatives of `grown` by the parameters, shape (n, p)."""
-        return grown_by(motion, values)
+        growth, constant_s, loss = values
+        time_s = _time_s(motion)
+        by_constant = growth * warmed_by_constant(time_s, constant_s)
+        by_constant = by_constant - loss * _paused(motion, constant_s, warmed_by_constant)
+        return np.column_stack([warmed(time_s, constant_s), by_constant, -_paused(motion, constant_s, warmed)])
 
     def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         self.require(motion)
@@ -248,10 +247,8 @@ class InTwoStages(ErrorSource):
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         growth, constant, *others = self._one.parameters(machine)
-        name, meaning = (
-            growth.name.split("_", 1)[1],
-            "growth that comes late: half of all where another body is heated first",
-        )
+        name = growth.name.split("_", 1)[1]
+        meaning = "growth that comes late: half of all where another body is heated first"
         delayed = replace(growth, name=f"delayed_{name}", plausible=FASTER * growth.plausible, meaning=meaning)
         return (growth, replace(constant, grid=TIME_CONSTANTS_S[::2]), *others, delayed)
 
@@ -271,22 +268,6 @@ def _two_bodies(count: int) -> tuple[Floats, Floats]:
     slow[0, -1], slow[2, 2] = more, more
     fast[0, 0], fast[0, -1], fast[1, 1], fast[2, 2] = 0.0, -more, FASTER, -FASTER * more
     return slow, fast
-
-
-def grown(motion: Motion, values: Floats) -> Floats:
-    """Return the growth at every sample in the unit of the parameters, shape (n,)."""
-    growth, constant_s, loss = values
-    law: Floats = growth * warmed(_time_s(motion), constant_s) - loss * _paused(motion, constant_s, warmed)
-    return law
-
-
-def grown_by(motion: Motion, values: Floats) -> Floats:
-    """Return derivatives of `grown` by its parameters, shape (n, 3)."""
-    growth, constant_s, loss = values
-    time_s = _time_s(motion)
-    by_constant = growth * warmed_by_constant(time_s, constant_s)
-    by_constant = by_constant - loss * _paused(motion, constant_s, warmed_by_constant)
-    return np.column_stack([warmed(time_s, constant_s), by_constant, -_paused(motion, constant_s, warmed)])
 
 
 def pauses_s(motion: Motion) -> list[tuple[float, float]]:

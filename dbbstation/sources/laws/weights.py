@@ -8,12 +8,11 @@ import numpy as np
 
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import Compliance, StrutMasses
-from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensions, transverse_load, transverse_pull
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
-    from dbbstation.machine.geometry import Frames, Hexapod, Machine, Masses
+    from dbbstation.machine.geometry import Frames, Machine, Masses
     from dbbstation.machine.kinematics import Struts
 
 
@@ -60,20 +59,18 @@ def stated_tensions(source: str, machine: Machine, frames: Frames, struts: Strut
     return strut_tensions(struts, load)
 
 
-def stated_loads(source: str, machine: Machine, frames: Frames, hexapod: Hexapod) -> Floats:
+def stated_loads(source: str, machine: Machine, frames: Frames, struts: Struts) -> Floats:
     """Return motor loads under the machine file's weights, shape (n, 6) [N].
 
     Args:
-        hexapod: nominal or actual joints.
+        struts: with nominal or actual joints.
     """
-    struts = inverse(hexapod, frames)
     return motor_loads(struts, stated_tensions(source, machine, frames, struts), machine.strut_masses)
 
 
 def masses_for_c(masses: StrutMasses | None) -> Floats:
     """Return a strut's masses and lengths as arguments of `strut_load` in `control/kernel.c`, shape (5,) [kg, mm]."""
-    none = StrutMasses(strut_kg=0.0, motor_kg=0.0, motor_length_mm=0.0)
-    own = masses or none
+    own = masses or StrutMasses(strut_kg=0.0, motor_kg=0.0, motor_length_mm=0.0)
     return np.array([own.strut_kg, own.motor_kg, own.motor_length_mm, own.screw_kg, own.screw_length_mm])
 
 

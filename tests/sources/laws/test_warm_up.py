@@ -20,7 +20,7 @@ from dbbstation.sources.causes.spindle_growth import SpindleGrowth
 from dbbstation.sources.causes.thermal_frame import ThermalFrame
 from dbbstation.sources.causes.thermal_struts import ThermalStruts
 from dbbstation.sources.contract import Fitted, Motion, Setup
-from dbbstation.sources.laws.temperature import PAUSE_S, TIME_CONSTANTS_S, grown, grown_by, pauses_s, warmed
+from dbbstation.sources.laws.temperature import PAUSE_S, TIME_CONSTANTS_S, pauses_s, warmed
 from tests.plant.mechanisms.warming import Warming
 from tests.sources.runs import concealed_share, jig_runs, random_run, run
 
@@ -70,7 +70,7 @@ def test_the_law_is_that_of_a_body_whose_heat_pauses(start, working, paused):
         )
         expected[inside], excess = solved.sol(TIMES_S[inside])[0] - start, solved.y[0][-1]
     values = np.array([working - start, 2100.0, working - paused])
-    assert np.allclose(grown(in_session(TIMES_S), values), expected, atol=1e-7)
+    assert np.allclose(BAR.grown(in_session(TIMES_S), values), expected, atol=1e-7)
 
 
 def test_it_is_the_law_of_the_reference_plant():
@@ -80,7 +80,7 @@ def test_it_is_the_law_of_the_reference_plant():
     times_s, excess_k = Warming(5.0, 1500.0, idle_share=1.0, head_start_s=500.0, off_s=off_s).history(scene, 14000.0)
     expected = np.interp(TIMES_S, times_s, excess_k)
     values = np.array([5.0 * np.exp(-500.0 / 1500.0), 1500.0, 5.0])
-    assert np.allclose(grown(in_session(TIMES_S), values), expected - expected[0], atol=5e-3)
+    assert np.allclose(BAR.grown(in_session(TIMES_S), values), expected - expected[0], atol=5e-3)
 
 
 def test_what_heats_only_while_runs_are_on_is_hardly_told_from_its_mean():
@@ -93,14 +93,16 @@ def test_what_heats_only_while_runs_are_on_is_hardly_told_from_its_mean():
     # At most the heat by which one run is off the mean, over the time constant.
     ripple_k = 4.0 * 100.0 / 2400.0
     expected = np.interp(time_s, times_s, excess_k)
-    assert np.abs(grown(motion, np.array([4.0, 2400.0, 4.0])) - expected).max() < ripple_k
+    assert np.abs(BAR.grown(motion, np.array([4.0, 2400.0, 4.0])) - expected).max() < ripple_k
 
 
 def test_derivatives_of_the_law_are_its_differences():
     motion, values = in_session(TIMES_S), np.array([12.0, 1700.0, -7.0])
     steps = np.diag([1e-3, 0.1, 1e-3])
-    differences = [(grown(motion, values + step) - grown(motion, values - step)) / (2 * step.max()) for step in steps]
-    assert np.allclose(grown_by(motion, values), np.column_stack(differences), rtol=1e-6, atol=1e-9)
+    differences = [
+        (BAR.grown(motion, values + step) - BAR.grown(motion, values - step)) / (2 * step.max()) for step in steps
+    ]
+    assert np.allclose(BAR.grown_by(motion, values), np.column_stack(differences), rtol=1e-6, atol=1e-9)
 
 
 def test_nothing_has_happened_before_the_session():

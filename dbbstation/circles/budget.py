@@ -163,7 +163,12 @@ def _range(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge)
     why = _why_not(one, quantity, known)
     found = estimate_of(one, quantity)
     if found is None:
-        read = _as_read(one)[quantity]
+        read = {
+            BudgetQuantity.G: one.g_um,
+            BudgetQuantity.G_LS: one.g_least_squares_um,
+            BudgetQuantity.F_MAX: one.f_centred.largest_um,
+            BudgetQuantity.F_MIN: one.f_centred.least_um,
+        }[quantity]
         return _budget(quantity, terms, missing, read, read, why)
     terms[BudgetTerm.NOISE] = hypot_of(found.u_um, terms.get(BudgetTerm.NOISE, 0.0))
     return _budget(quantity, terms, missing, found.value_um, found.as_read_um, why)
@@ -175,15 +180,6 @@ def _of_extremes(one: CircleAnalysis, extremes: int) -> dict[BudgetTerm, float]:
     return {
         BudgetTerm.RESOLUTION: root * along * one.noise.resolution_um / ROUNDING,
         BudgetTerm.CLOSURE: root * _closure_um(one) / ROUNDING,
-    }
-
-
-def _as_read(one: CircleAnalysis) -> dict[BudgetQuantity, float]:
-    return {
-        BudgetQuantity.G: one.g_um,
-        BudgetQuantity.G_LS: one.g_least_squares_um,
-        BudgetQuantity.F_MAX: one.f_centred.largest_um,
-        BudgetQuantity.F_MIN: one.f_centred.least_um,
     }
 
 
@@ -216,10 +212,7 @@ def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[BudgetQuanti
     """Return the budgets of G(b), D and H of a circle in both directions on one mounting."""
     radius = [budget_of(one, BudgetQuantity.RADIUS, known) for one in (pair.one, pair.other)]
     noise = hypot_of(radius[0].terms_um[BudgetTerm.NOISE], radius[1].terms_um[BudgetTerm.NOISE]) / 2.0
-    shared: dict[BudgetTerm, float] = {
-        cause: size for cause, size in radius[0].terms_um.items() if cause is not BudgetTerm.NOISE
-    }
-    d_terms = {BudgetTerm.NOISE: noise, **shared}
+    d_terms = {**radius[0].terms_um, BudgetTerm.NOISE: noise}
     found = {
         quantity: _pair_range(pair, quantity)
         for quantity in (BudgetQuantity.G_BOTH, BudgetQuantity.G_BOTH_LS, BudgetQuantity.H)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
@@ -43,7 +43,7 @@ def estimate_of(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate | Non
 
 @once_for_each
 def _estimate(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate:
-    drawn = _drawn(one).alone
+    _, drawn, _ = _drawn(one)
     radius_um, deviation_um = one.radius_error_um, 1e3 * one.path.least_squares.deviation_mm
     match quantity:
         case BudgetQuantity.G:
@@ -85,24 +85,13 @@ OF_A_CIRCLE = 2
 """Lines of the spectrum that the least-squares circle removes: radius and centre."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Drawn:
-    """Form at samples, shape (n,) [µm], with noise drawn about its own and about the common least-squares circle."""
-
-    form_um: Floats
-    alone: DrawnPath
-    beside: DrawnPath
-
-
 @once_for_each
-def _drawn(one: CircleAnalysis) -> _Drawn:
-    apart = _apart(one)
-    form_um = _filtered(apart.form_um, one.chosen)
-    passed = one.chosen.passed(np.arange(len(form_um) // 2 + 1.0))
+def _drawn(one: CircleAnalysis) -> tuple[Floats, DrawnPath, DrawnPath]:
+    """Return form at samples, shape (n,) [µm], with noise drawn about its own and about the common least-squares circle."""
+    apart, passed = _filtered(_apart(one), one.chosen)
     seed = int(one.raw.circle.direction.sign > 0)
-    own = replace(apart, form_um=form_um)
-    alone, beside = drawn_paths(own, one.path.theta_deg, passed, seed, (OF_A_CIRCLE, 0))
-    return _Drawn(form_um, alone, beside)
+    alone, beside = drawn_paths(apart, one.path.theta_deg, passed, seed, (OF_A_CIRCLE, 0))
+    return apart.form_um, alone, beside
 
 
 def pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate | None:
@@ -117,31 +106,29 @@ def _pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate:
     paths = []
     split = np.split(1e3 * pair.together.least_squares.deviation_mm, [len(pair.one.raw)])
     for one, deviation_um in zip((pair.one, pair.other), split, strict=True):
-        drawn = _drawn(one)
+        form_um, _, beside = _drawn(one)
         # About the common circle, each direction's radius and centre are form.
         beside_um = deviation_um - 1e3 * one.path.least_squares.deviation_mm
-        paths.append(drawn.beside.with_form(drawn.form_um + beside_um))
+        paths.append(beside.with_form(form_um + beside_um))
     if quantity is BudgetQuantity.G_BOTH:
         return estimated(paths, strip_widths, pair.g_um)
     return estimated(paths, range_of, pair.g_least_squares_um)
 
 
-def _filtered(form_um: Floats, chosen: Filter) -> Floats:
+def _filtered(apart: FormAndNoise, chosen: Filter) -> tuple[FormAndNoise, Floats]:
+    count = len(apart.form_um)
+    passed = chosen.passed(np.arange(count // 2 + 1.0))
     if not chosen:
-        return form_um
-    passed = chosen.passed(np.arange(len(form_um) // 2 + 1.0))
-    return np.asarray(np.fft.irfft(passed * np.fft.rfft(form_um), len(form_um)))
+        return apart, passed
+    return replace(apart, form_um=np.fft.irfft(passed * np.fft.rfft(apart.form_um), count)), passed
 
 
 def _hysteresis(pair: PairAnalysis) -> Estimate:
     paths = [path_of(one.raw) for one in (pair.one, pair.other)]
     theta_deg = np.sort(paths[0].theta_deg)
     radii = [np.interp(theta_deg, p.theta_deg, p.about_ball_mm, period=FULL_TURN_DEG) for p in paths]
-    apart = form_and_noise(1e3 * (radii[0] - radii[1]))
-    chosen = pair.one.chosen
-    passed = chosen.passed(np.arange(len(theta_deg) // 2 + 1.0))
-    own = replace(apart, form_um=_filtered(apart.form_um, chosen))
-    return estimated(drawn_paths(own, theta_deg, passed, 2), farthest_of, pair.h_um)
+    apart, passed = _filtered(form_and_noise(1e3 * (radii[0] - radii[1])), pair.one.chosen)
+    return estimated(drawn_paths(apart, theta_deg, passed, 2), farthest_of, pair.h_um)
 
 
 class BudgetQuantity(StrEnum):

@@ -219,10 +219,8 @@ def estimated(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
     # covers the results of the whole spectrum and of its end.
     if not max(path.sigma_um for path in paths) > 0.0:
         return Estimate(as_read_um, 0.0, as_read_um)
-    with_all = _interval(paths, statistic, as_read_um)
-    if min(path.least for path in paths) > ALIKE:
-        with_least = with_all
-    else:
+    value, low, high, least_u = _interval(paths, statistic, as_read_um)
+    if min(path.least for path in paths) <= ALIKE:
         quiet = [
             replace(
                 path,
@@ -232,10 +230,9 @@ def estimated(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
             )
             for path in paths
         ]
-        with_least = _interval(quiet, statistic, as_read_um)
-    low, high = min(with_all.low, with_least.low), max(with_all.high, with_least.high)
-    value = 0.5 * (with_all.value + with_least.value)
-    u = max((value - low) / QUANTILE, (high - value) / QUANTILE, with_all.least_u)
+        of_end, lowest, highest, _ = _interval(quiet, statistic, as_read_um)
+        value, low, high = 0.5 * (value + of_end), min(low, lowest), max(high, highest)
+    u = max((value - low) / QUANTILE, (high - value) / QUANTILE, least_u)
     return Estimate(value, u, as_read_um)
 
 
@@ -244,15 +241,8 @@ ALIKE = 0.95
 lines is lower by a twentieth."""
 
 
-@dataclass(frozen=True)
-class _Interval:
-    value: float
-    low: float
-    high: float
-    least_u: float
-
-
-def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: float) -> _Interval:
+def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: float) -> tuple[float, float, float, float]:
+    """Return the value, both ends of its interval, and the least uncertainty [µm]."""
     angles = np.unique(np.concatenate([path.theta_deg for path in paths]))
     forms = [_at(angles, path.theta_deg, path.form_um[None, :], np.nan)[0] for path in paths]
     highest = [_at(angles, path.theta_deg, path.highest_um, -np.inf) for path in paths]
@@ -273,7 +263,7 @@ def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
 
     of_form = float(at(1.0, noisy=False)[0])
     if not of_form > 0.0:
-        return _Interval(as_read_um, as_read_um, as_read_um, 0.0)
+        return as_read_um, as_read_um, as_read_um, 0.0
     sigma_um = max(path.sigma_um for path in paths)
     tried: dict[float, Floats] = {}
     # Increase until hardly a draw is below the measured range; decrease until hardly a draw is above.
@@ -291,7 +281,7 @@ def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
     curves = (mean, *np.quantile(shown, [0.975, 0.025], axis=1))
     value, low, high = (float(np.interp(as_read_um, np.maximum.accumulate(curve), sizes)) for curve in curves)
     # The scatter of the readings bounds the interval from below.
-    return _Interval(value, low, high, 0.5 * float(np.interp(value, sizes, spread)))
+    return value, low, high, 0.5 * float(np.interp(value, sizes, spread))
 
 
 def _at(angles: Floats, theta_deg: Floats, values: Floats, elsewhere: float) -> Floats:

@@ -66,20 +66,23 @@ def step_at(raw: RawCircle, deviation_um: Floats, theta_deg: float, sigma_um: fl
     place = float(raw.circle.phi_deg(np.array([theta_deg]))[0])
     if not FAR_DEG <= place <= FULL_TURN_DEG - FAR_DEG:
         return None
-    ends = [_line_at(raw.phi_deg - place, deviation_um, side, sigma_um) for side in (-1.0, 1.0)]
-    if any(end is None for end in ends):
-        return None
-    (before, u_before), (behind, u_behind) = (end for end in ends if end is not None)
-    return ReversalStep(theta_deg, behind - before, hypot_of(u_before, u_behind))
+    before, behind = (_line_at(raw.phi_deg - place, deviation_um, side, sigma_um) for side in (-1.0, 1.0))
+    return _between(theta_deg, before, behind)
 
 
 def closure_of(raw: RawCircle, deviation_um: Floats, sigma_um: float) -> ReversalStep | None:
     """Return the turn's end less its beginning; None for too few samples."""
     beginning = _line_at(raw.phi_deg, deviation_um, 1.0, sigma_um, near_deg=0.0)
     end = _line_at(raw.phi_deg - FULL_TURN_DEG, deviation_um, -1.0, sigma_um, near_deg=0.0)
-    if beginning is None or end is None:
+    return _between(raw.circle.start_deg, beginning, end)
+
+
+def _between(
+    theta_deg: float, before: tuple[float, float] | None, behind: tuple[float, float] | None
+) -> ReversalStep | None:
+    if before is None or behind is None:
         return None
-    return ReversalStep(raw.circle.start_deg, end[0] - beginning[0], hypot_of(beginning[1], end[1]))
+    return ReversalStep(theta_deg, behind[0] - before[0], hypot_of(before[1], behind[1]))
 
 
 def _line_at(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -99,15 +100,6 @@ def _put(four: Integers, new: int, kind: int) -> None:
 
 
 def _first_points(outer: Floats, inner: Floats, theta_deg: Floats) -> Integers:
-    edges = np.searchsorted(theta_deg, [0.0, 90.0, 180.0, 270.0, 360.0])
-    return np.column_stack(
-        [
-            edges[k]
-            + (
-                inner[:, edges[k] : edges[k + 1]].argmin(axis=1)
-                if k % 2
-                else outer[:, edges[k] : edges[k + 1]].argmax(axis=1)
-            )
-            for k in range(4)
-        ]
-    )
+    sectors = enumerate(pairwise(np.searchsorted(theta_deg, [0.0, 90.0, 180.0, 270.0, 360.0])))
+    found = [a + (inner[:, a:b].argmin(axis=1) if k % 2 else outer[:, a:b].argmax(axis=1)) for k, (a, b) in sectors]
+    return np.column_stack(found)

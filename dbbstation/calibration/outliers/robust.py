@@ -139,12 +139,10 @@ def _looks_like(
             best, where = rest, other
     if best < noise:
         what = f"it is what test {where.test} {where.raw.circle.direction} should read, to {best:.1f} µm"
+        why = "the ball stood in that bore, or the run was filed under the wrong test"
         if where.test == run.test:
-            return OutlierKind.WRONG_PLACE, f"{what}; was the other direction run?"
-        return (
-            OutlierKind.WRONG_PLACE,
-            f"{what}; the ball stood in that bore, or the run was filed under the wrong test",
-        )
+            why = "was the other direction run?"
+        return OutlierKind.WRONG_PLACE, f"{what}; {why}"
     step, at = _step(residual)
     levelled = [part - part.mean() for part in (residual[:at], residual[at:])]
     if rms_um(np.concatenate(levelled)) < 0.5 * rms_um(residual - residual.mean()):

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.model.observation import Observation
+    from dbbstation.plan.plan import Direction
     from dbbstation.plan.tolerance import Tolerance
 
 PLANE_HALF_WIDTH_MM = 190.0
@@ -95,7 +96,8 @@ def evaluate(model: MachineModel, observations: Sequence[Observation]) -> Evalua
     """
     before, nominal_rms_um = _under(MachineModel(model.machine), observations)
     after, left_rms_um = _under(model.of_the_machine(), observations)
-    first = [_first_in_direction(observations, k) for k in range(len(observations))]
+    begun: dict[tuple[str, Direction], int] = {}
+    first = [begun.setdefault((o.setup.session, o.raw.circle.direction), k) for k, o in enumerate(observations)]
     runs = tuple(
         EvaluatedRun(
             test=o.test,
@@ -184,15 +186,6 @@ def _error_mm(model: MachineModel, xy_mm: Floats, height_mm: float, corrected: M
     actual = model.anywhere().actual_poses(motion)
     believed = poses if corrected is None else corrected.anywhere().actual_poses(motion)
     return actual[:, :3] - believed[:, :3]
-
-
-def _first_in_direction(observations: Sequence[Observation], k: int) -> int:
-    wanted = observations[k]
-    return next(
-        i
-        for i, o in enumerate(observations)
-        if o.setup.session == wanted.setup.session and o.raw.circle.direction == wanted.raw.circle.direction
-    )
 
 
 def apart_um(a: CircleFigures, b: CircleFigures) -> float:

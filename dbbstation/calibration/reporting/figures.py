@@ -26,7 +26,6 @@ from dbbstation.facts.value import Value
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import GRAVITY_M_S2
 from dbbstation.model.identified import IdentifiedModel, known_u
-from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.drive_friction import PER_MOTOR, of_motor
 from dbbstation.sources.contract import Owner
 from dbbstation.sources.laws.weights import platform_masses
@@ -293,7 +292,7 @@ def identified_model(
     of_formulas = calibration.layout.formula_variance(calibration.x)[rows]
     covariance = calibration.solution.covariance[np.ix_(rows, rows)] + np.diag(of_formulas)
     return IdentifiedModel(
-        model=MachineModel(calibration.layout.machine, calibration.model.sources),
+        model=calibration.model,
         covariance_rows=tuple(names[row] for row in rows),
         covariance=(covariance + covariance.T) / 2.0,
         directions_lost=calibration.directions_lost,

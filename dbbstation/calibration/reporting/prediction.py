@@ -46,8 +46,7 @@ def predicted_circles(
     for o, before, after in counting(list(zip(observations, nominal, left, strict=True)), progress):
         raw, bar_mm = o.raw, o.raw.circle.bar_mm
         lengths_mm = [raw.length_mm, raw.length_mm - after, bar_mm + before, bar_mm + after]
-        circle = LowPassedCircularity(*smooth_circularities_um(raw, lengths_mm))
-        circles.append(circle)
+        circles.append(LowPassedCircularity(*smooth_circularities_um(raw, lengths_mm)))
     return tuple(circles)
 
 

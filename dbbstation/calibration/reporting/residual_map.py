@@ -127,20 +127,9 @@ def circle_tests(calibration: Calibration) -> tuple[CircleTest, ...]:
     """Return every test's circles and centres, in recording order."""
     observations, model = calibration.observations, calibration.model
     nominal = residuals(MachineModel(model.machine), observations)
-    names = names_of_tests(observations)
-    return tuple(
-        _test(
-            name,
-            [
-                (observation, before, after)
-                for observation, before, after, own in zip(
-                    observations, nominal, calibration.machine_residual_mm, names, strict=True
-                )
-                if own == name
-            ],
-        )
-        for name in dict.fromkeys(names)
-    )
+    runs = zip(observations, nominal, calibration.machine_residual_mm, strict=True)
+    tests = grouped(zip(names_of_tests(observations), runs, strict=True))
+    return tuple(_test(name, own) for name, own in tests.items())
 
 
 def ball_shifts(calibration: Calibration) -> tuple[BallShift, ...]:

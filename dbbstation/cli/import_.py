@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -104,8 +104,7 @@ def import_(
     elif remembered is not None:
         refuse_existing(remembered, force=False)
     asker = Asker()
-    told = _Told(runs, started, frozenset(trust), not_known)
-    found = _read(asker, files, of_mapping, (plan, machine), told, noted)
+    found = _read(asker, files, of_mapping, noted, (plan, machine), runs, started, frozenset(trust), not_known)
     with staged(out, found, dry=dry_run) as put:
         if not as_json:
             _show(found)
@@ -123,21 +122,16 @@ def import_(
         echo_line(f"{len(found.runs)} runs written to {out}{kept}")
 
 
-@dataclass(frozen=True)
-class _Told:
-    named: Sequence[str]
-    started: Sequence[str]
-    trusted: frozenset[str]
-    not_known: Sequence[str]
-
-
 def _read(
     asker: Asker,
     files: Sequence[Path],
     of_mapping: MappingOptions,
-    paths: tuple[Path | None, Path | None],
-    said: _Told,
     noted: SessionOptions,
+    paths: tuple[Path | None, Path | None],
+    named: Sequence[str],
+    started: Sequence[str],
+    trusted: frozenset[str],
+    not_known: Sequence[str],
 ) -> ImportedSession:
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
@@ -149,24 +143,23 @@ def _read(
     chosen = chosen_mapping(list(tables.values()), of_mapping, asker)
     plan = paths[0] or Path(asker.text("test plan whose circles were run", "--plan"))
     machine = paths[1] or Path(asker.text("file of the machine", "--machine"))
-    noted = _with_conditions(asker, noted, said.not_known)
+    noted = _with_conditions(asker, noted, not_known)
     asker.check()
     mapping, inline, nominal = chosen(), read_inline_plan(plan), read_machine(machine)
     planned = inline.to_domain()
-    told = _told(files, said.named, planned)
-    started = _started(files, said.started, mapping.zone)
-    reader = Reader(_split(asker, mapping, list(tables.values())), planned, started, said.trusted)
+    told, begun = _told(files, named, planned), _started(files, started, mapping.zone)
+    reader = Reader(_split(asker, mapping, list(tables.values())), planned, begun, trusted)
     reader = _with_span(asker, reader, list(tables.values()))
     mapping = reader.mapping
     runs: list[ImportedRun] = []
     for path, table in tables.items():
         runs += reader.read(table, told.get(path) or [_asked_run(asker, reader, table, planned)])
     reader.check()
-    places = {(one.run.test, one.run.direction, one.run.repeat): one for one in runs}
-    runs = [places[one.test, one.direction, one.repeat] for one in repeats_in_order(one.run for one in runs)]
-    trusted = [f"taken as they are, whatever they look like: {one}" for one in sorted(said.trusted)]
-    centred = [] if "centre" in said.trusted else _asked_centres(asker, runs, planned)
-    statements = [*_statements(mapping, runs, _unknown(noted)), *trusted, *centred, *reader.left_out]
+    places = {one.run.key: one for one in runs}
+    runs = [places[one.key] for one in repeats_in_order(one.run for one in runs)]
+    as_they_are = [f"taken as they are, whatever they look like: {one}" for one in sorted(trusted)]
+    centred = [] if "centre" in trusted else _asked_centres(asker, runs, planned)
+    statements = [*_statements(mapping, runs, _unknown(noted)), *as_they_are, *centred, *reader.left_out]
     now = datetime.now(UTC).replace(microsecond=0)
     notes = tuple(Note(now, f"imported: {text}") for text in statements)
     details = replace(noted.details(), notes=notes)
@@ -185,7 +178,7 @@ def _result(found: ImportedSession, out: Path, *, written: bool) -> ImportResult
     from dbbstation.results.exchange import ImportResult, TakenRun
 
     runs = tuple(
-        TakenRun(Path(one.file).name, one.name, len(one.run.columns.get("t_s", ())), tuple(one.computed))
+        TakenRun(Path(one.file).name, one.run.label, len(one.run.columns.get("t_s", ())), tuple(one.computed))
         for one in found.runs
     )
     mapping = found.mapping.model_dump(exclude_none=True)
@@ -193,17 +186,16 @@ def _result(found: ImportedSession, out: Path, *, written: bool) -> ImportResult
 
 
 def _with_conditions(asker: Asker, told: SessionOptions, not_known: Sequence[str]) -> SessionOptions:
-
     asked_for = set(_unknown(told)) - set(not_known)
     if "temperature" in asked_for:
-        asked = asker.number("temperature of the shop [degC]", _or("--ambient-temp-c", "temperature"))
+        asked = asker.number("temperature of the shop [degC]", "--ambient-temp-c, or --not-known temperature")
         told = replace(told, ambient_temp_c=asked)
     if "operator" in asked_for:
-        told = replace(told, operator=asker.text("who measured", _or("--operator", "operator"), default=""))
+        told = replace(told, operator=asker.text("who measured", "--operator, or --not-known operator", default=""))
     if "job" in asked_for:
-        told = replace(told, job=asker.text("what it was measured for", _or("--job", "job"), default=""))
+        told = replace(told, job=asker.text("what it was measured for", "--job, or --not-known job", default=""))
     if "bar" in asked_for:
-        option = _or("--bar FILE, or --bar-length-mm with --bar-uncertainty-um", "bar")
+        option = "--bar FILE, or --bar-length-mm with --bar-uncertainty-um, or --not-known bar"
         length_mm = asker.number("calibrated length of the bar [mm]", option)
         told = replace(told, bar_length_mm=length_mm)
         if length_mm is not None:
@@ -216,10 +208,6 @@ def _unknown(told: SessionOptions) -> list[str]:
     has_bar = told.bar is not None or told.bar_length_mm is not None
     known = (told.ambient_temp_c is not None, bool(told.operator), bool(told.job), has_bar)
     return [one for one, is_known in zip(CONDITIONS, known, strict=True) if not is_known]
-
-
-def _or(option: str, condition: str) -> str:
-    return f"{option}, or --not-known {condition}"
 
 
 def _told(files: Sequence[Path], named: Sequence[str], plan: Plan) -> dict[Path, list[RunName]]:
@@ -319,7 +307,6 @@ def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> lis
 
 
 def _with_span(asker: Asker, reader: Reader, tables: Sequence[ForeignTable]) -> Reader:
-
     angle = reader.mapping.angle
     if angle is None or angle.span_deg is not None or not asker.terminal:
         return reader
@@ -346,7 +333,7 @@ def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], unknown: Sequ
     if mapping.column(ANGLE) is not None and mapping.angle is not None:
         zero = "the start of the turn" if mapping.angle.zero_deg is None else f"{mapping.angle.zero_deg:g} degrees"
         found.append(f"angle 0 of the files is {zero}, their angles grow with {mapping.angle.grows}")
-    for text, names in grouped((text, one.name) for one in runs for text in one.computed).items():
+    for text, names in grouped((text, one.run.label) for one in runs for text in one.computed).items():
         found.append(f"{text} ({'every run' if len(names) == len(runs) else ', '.join(names)})")
     return [*found, *(f"not stated: {one}" for one in unknown)]
 
@@ -361,7 +348,7 @@ def _show(found: ImportedSession) -> None:
         length, t_s = one.run.columns[LENGTH], one.run.columns[TIME]
         span = f"{float(length.min()):.4f} to {float(length.max()):.4f}"
         rows.append(
-            [Path(one.file).name, one.name, str(len(t_s)), f"{t_s[-1] - t_s[0]:.2f}", span, one.run.state.value]
+            [Path(one.file).name, one.run.label, str(len(t_s)), f"{t_s[-1] - t_s[0]:.2f}", span, one.run.state.value]
         )
     print_table("file, run, samples, t [s], length [mm], state", rows)
     details = found.details

@@ -123,7 +123,8 @@ class TaskParameter:
         try:
             return self._read(value)
         except (TypeError, ValueError) as error:
-            what = str(error) if isinstance(error, ValueError) else f"`{value!r:.60}` is no {self._kind}"
+            kind = _KINDS.get(self.type, "value for it")
+            what = str(error) if isinstance(error, ValueError) else f"`{value!r:.60}` is no {kind}"
             raise ArgumentError(self.name, what) from None
 
     @property
@@ -133,10 +134,6 @@ class TaskParameter:
         if get_origin(self.type) is Literal:
             kind = f"Literal[{', '.join(map(repr, get_args(self.type)))}]"
         return f"{kind} | None" if self.default is None else kind
-
-    @property
-    def _kind(self) -> str:
-        return _KINDS.get(self.type, "value for it")
 
     def _read(self, value: Any) -> Any:  # noqa: ANN401 - of any parameter
         kind = self.type

@@ -33,7 +33,7 @@ class SchedulerError(StationError):
 class Ended:
     """A piece of work ended its process, even when it ran alone."""
 
-    why: str
+    problem: str
 
 
 @dataclass(frozen=True)

@@ -83,9 +83,8 @@ def exporting(runs: Sequence[tuple[SessionFolder, RunEntry]]) -> Exporting:
     known = [
         name for name in columns.COLUMNS if name in found and name not in {columns.TIME, columns.THETA, columns.LENGTH}
     ]
-    others = [name for name in found if name not in columns.COLUMNS and name != columns.CRC]
     # A column of the file that is named like one of ours would stand there twice.
-    clear = [name for name in others if name not in {*OF_RUN, ANGLE, DEVIATION}]
+    clear = [name for name in found if name not in {*columns.COLUMNS, columns.CRC, *OF_RUN, ANGLE, DEVIATION}]
     names = (*OF_RUN, columns.TIME, columns.THETA, ANGLE, columns.LENGTH, DEVIATION, *known, *clear)
     return Exporting(tuple(runs), names)
 

@@ -173,7 +173,7 @@ def fleet(
         todo = []
         for place, one in enumerate(named):
             if one.problem:
-                outcomes[place] = _failed(one, one.problem)
+                outcomes[place] = _outcome(one, "failed", problem=one.problem)
                 say(f"failed: {one.name}: {one.problem}")
             elif not anew and (data := kept.known(one.name, keys[place])) is not None:
                 outcomes[place] = _known(one, kept, data, fresh=False)
@@ -258,10 +258,8 @@ def _plain(options: FleetOptions) -> dict[str, object]:
 
 
 def _taken(one: _Named, kept: FleetFolder, key: str, result: Worked | Ended) -> _Outcome:
-    if isinstance(result, Ended):
-        return _failed(one, result.why)
-    if result.problem:
-        return _failed(one, result.problem)
+    if isinstance(result, Ended) or result.problem:
+        return _outcome(one, "failed", problem=result.problem)
     data = {"session": one.name, "machine": one.machine, **result.found, "result": result.result}
     return _known(one, kept, kept.keep(one.name, key, data, result.files), fresh=True)
 
@@ -270,10 +268,6 @@ def _known(one: _Named, kept: FleetFolder, data: dict[str, object], *, fresh: bo
     found, stored = read_plain(FleetFound, data), read_plain(StoredFiles, data)
     files = (kept.file_of(one.name, stored.key), *stored.files)
     return _outcome(one, "done" if fresh else "up-to-date", found, files=files)
-
-
-def _failed(one: _Named, problem: str) -> _Outcome:
-    return _outcome(one, "failed", problem=problem)
 
 
 def _outcome(

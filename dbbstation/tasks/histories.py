@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -111,22 +111,6 @@ def _seal_note(kept: Kept, folder: Path, one: SessionFigures, moment: datetime) 
 _Kind = TypeVar("_Kind", SessionFigures, ModelFigures)
 
 
-@dataclass(frozen=True)
-class _File:
-    """A file with its relative path and stamp."""
-
-    name: str
-    path: Path
-    stamp: str
-
-
-@dataclass(frozen=True)
-class _Unreadable:
-    """The reason why a file cannot be read."""
-
-    reason: str
-
-
 class _Reading:
     def __init__(self, kept: Kept, progress: Counted, of: int) -> None:
         self.of = of
@@ -147,37 +131,35 @@ class _Reading:
         """Return the figures of readable files in order."""
         found: dict[str, _Kind] = {}
         reasons: dict[str, str] = {}
-        unknown: dict[str, list[_File]] = {}
+        unknown: dict[str, list[tuple[str, str]]] = {}  # names and stamps of files with one content
         for name, path in files.items():
             try:
                 more = others(path)
-                file = _File(name, path, stamp_of(path, *more))
-                one = _understood(kind, self._kept.of(name, file.stamp))
+                stamp = stamp_of(path, *more)
+                one = _understood(kind, self._kept.of(name, stamp))
                 if one is None:
                     digest = key_of({"task": kind.__name__}, _contents(path, more))
                     text = self._kept.of_content(digest)
                     one = _understood(kind, text)
                     if text is None or one is None:
-                        unknown.setdefault(digest, []).append(file)
+                        unknown.setdefault(digest, []).append((name, stamp))
                         continue
-                    self._kept.keep(name, file.stamp, digest, text)
+                    self._kept.keep(name, stamp, digest, text)
                 found[name] = one
             except OSError as error:
                 reasons[name] = reason_of(error)
             self._count()
-        digests, paths = list(unknown), [same[0].path for same in unknown.values()]
+        digests, paths = list(unknown), [files[same[0][0]] for same in unknown.values()]
         with closing(each(partial(_tried, work), paths, processes(paths))) as outcomes:
             for place, outcome in outcomes:
                 digest = digests[place]
                 self.worked_out += 1
-                for file in unknown[digest]:
-                    if isinstance(outcome, _Unreadable):
-                        reasons[file.name] = outcome.reason
+                for name, stamp in unknown[digest]:
+                    if isinstance(outcome, str):
+                        reasons[name] = outcome
                     else:
-                        found[file.name] = outcome
-                        self._kept.keep(
-                            file.name, file.stamp, digest, json_of(found[file.name], indent=None, escaped=True)
-                        )
+                        found[name] = outcome
+                        self._kept.keep(name, stamp, digest, json_of(outcome, indent=None, escaped=True))
                     self._count()
         self.left_out += [(_called(name), reasons[name]) for name in files if name in reasons]
         for name in (name for name in files if name in found):
@@ -228,14 +210,15 @@ def _model_data(path: Path, source_files: Sequence[Path]) -> ModelFigures:
     return model_figures(path, source_files)
 
 
-def _tried(work: Callable[[Path], _Kind], path: Path) -> _Kind | _Unreadable:
+def _tried(work: Callable[[Path], _Kind], path: Path) -> _Kind | str:
+    """Return a file's figures, or why it cannot be read."""
     try:
         return work(path)
     except OSError as error:
-        return _Unreadable(reason_of(error))
+        return reason_of(error)
     except StationError as error:
         lines = str(error).splitlines()
-        return _Unreadable(lines[0] + (f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""))
+        return lines[0] + (f" (and {len(lines) - 1} more)" if len(lines) > 1 else "")
 
 
 def _called(name: str) -> str:

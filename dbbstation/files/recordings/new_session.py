@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, OutputError, Problem
-from dbbstation.facts import of_facts
+from dbbstation.facts import NamedRun, of_facts
 from dbbstation.files.atomic import write_folder
 from dbbstation.files.formats.machine import machine_text
 from dbbstation.files.formats.plan import plan_text
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class FinishedRun:
+class FinishedRun(NamedRun):
     """A complete run, such as a simulated one.
 
     Attributes:

@@ -70,11 +70,6 @@ class ImportedRun:
     run: FinishedRun
     computed: tuple[str, ...]
 
-    @property
-    def name(self) -> str:
-        """Return the name, such as `a-ccw-1`."""
-        return f"{self.run.test}-{self.run.direction}-{self.run.repeat}"
-
 
 @dataclass
 class Reader:
@@ -320,31 +315,26 @@ class Reader:
     def _started(
         self, table: ForeignTable, rows: Integers, said: Mapping[str, str], computed: list[str]
     ) -> datetime | None:
-        at = self._stated_start(table, rows, said, computed)
-        wrong = "" if at is None else impossible_day(at)
+        file, line, in_column = table.table.file, int(table.table.lines[rows[0]]), said.get(STARTED, "")
+        at = self.started.get(file)
+        later = timedelta(seconds=self._later_s(table, rows) if at is not None or not in_column else 0.0)
+        if at is None:
+            try:
+                found = moment_of(in_column, table.comments, PurePath(file).stem, self.mapping.zone)
+            except UnclearMomentError as error:
+                remedy = "say --started FILE=2026-11-20T08:04:11+01:00, or ignore the column"
+                self._fault(file, {**table.comment_lines, "": line}.get(error.key, 0), error.what, remedy)
+                return None
+            if found is None:
+                return None
+            at = found.at
+            computed += found.assumed
+        at += later
+        wrong = impossible_day(at)
         if wrong:
             remedy = "say the right one, such as --started FILE=2026-11-20T08:04:11+01:00, and check the clock of what recorded it"
-            self._fault(table.table.file, int(table.table.lines[rows[0]]), f"this run is of {wrong}", remedy)
+            self._fault(file, line, f"this run is of {wrong}", remedy)
         return at
-
-    def _stated_start(
-        self, table: ForeignTable, rows: Integers, said: Mapping[str, str], computed: list[str]
-    ) -> datetime | None:
-        later = timedelta(seconds=self._later_s(table, rows))
-        if table.table.file in self.started:
-            return self.started[table.table.file] + later
-        in_column = said.get(STARTED, "")
-        lines = {**table.comment_lines, "": int(table.table.lines[rows[0]])}
-        try:
-            found = moment_of(in_column, table.comments, PurePath(table.table.file).stem, self.mapping.zone)
-        except UnclearMomentError as error:
-            remedy = "say --started FILE=2026-11-20T08:04:11+01:00, or ignore the column"
-            self._fault(table.table.file, lines.get(error.key, 0), error.what, remedy)
-            return None
-        if found is None:
-            return None
-        computed += found.assumed
-        return found.at if in_column else found.at + later
 
     def _later_s(self, table: ForeignTable, rows: Integers) -> float:
         name = self.mapping.column(TIME)

@@ -109,9 +109,9 @@ def _try_out(folder: Path, runs: Sequence[ImportedRun]) -> None:
         except InputError as error:
             # Columns have other names in the file that they come from, and rows other lines.
             faults += [
-                replace(fault, file=one.file, line=0, what=f"as run {one.name}: {fault.what}")
+                replace(fault, file=one.file, line=0, what=f"as run {one.run.label}: {fault.what}")
                 for fault in error.problems
             ]
         except TraceError as error:
-            faults.append(Problem.of(one.file, f"as run {one.name}: {error.what}", error.remedy))
+            faults.append(Problem.of(one.file, f"as run {one.run.label}: {error.what}", error.remedy))
     refuse(faults)

@@ -11,7 +11,7 @@ from pydantic import Field
 from dbbstation.computing.arrays import median_of, sum_of
 from dbbstation.diagnosis.compare.findings import DirectionHalves, LargestEffect, RunDifference
 from dbbstation.diagnosis.compare.pairs import NotComparable
-from dbbstation.facts import of_facts, picked
+from dbbstation.facts import of_facts
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import Cancelling
 from dbbstation.inference.bounds import BOUNDS
@@ -131,6 +131,7 @@ class ComparisonResult(Framed):
     averaged: tuple[str, ...]
     unlike: Annotated[tuple[str, ...], Field(serialization_alias="notes")]
     levels: Levels
+    _table_of = "runs", "test, direction, differs, found_rms_um, rms_um, noise_rms_um, peak_um, peak_theta_deg"
 
     def sentences(self) -> list[str]:
         """Return the answer in three levels, in words."""
@@ -140,11 +141,6 @@ class ComparisonResult(Framed):
     def headline(self) -> str:
         """Return whether the sessions differ."""
         return self.text
-
-    def rows(self) -> list[dict[str, object]]:
-        """Return one row per run."""
-        beyond = ("differs", "found_rms_um", "rms_um", "noise_rms_um", "peak_um", "peak_theta_deg")
-        return [picked(run, "test", "direction", *beyond) for run in self.runs]
 
 
 def comparison_result(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.diagnosis.drive.findings import DriveFindings
-from dbbstation.facts import of_facts, picked
+from dbbstation.facts import of_facts
 from dbbstation.facts.serialise import Absent
 from dbbstation.files.provenance import Provenance, write_table
 from dbbstation.files.recordings.drive_csv import compared_csv
@@ -24,6 +24,7 @@ class DriveResult(Framed, DriveFindings):
 
     compared: Annotated[str | None, Absent] = None
     figure: Annotated[str | None, Absent] = None
+    _table_of = "sources", "name, verdict, probability, gain, concealed, signature_rms_n, text"
 
     def sentences(self) -> list[str]:
         """Return the answer in three levels, in words."""
@@ -33,11 +34,6 @@ class DriveResult(Framed, DriveFindings):
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
         write_table(path, compared_csv(self.table), provenance, force=force)
-
-    def rows(self) -> list[dict[str, object]]:
-        """Return one row per cause."""
-        shown = ("name", "verdict", "probability", "gain", "concealed", "signature_rms_n", "text")
-        return [picked(one, *shown) for one in self.sources]
 
 
 def drive_result(found: DriveFindings, drawing: Callable[[object], bytes] | None = None) -> DriveResult:

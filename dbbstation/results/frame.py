@@ -7,14 +7,16 @@ import html
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, SupportsIndex, TypeVar, get_args, overload
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, SupportsIndex, TypeVar, get_args, overload
 
 from pydantic_core import core_schema
 
 from dbbstation.errors import ArgumentError, OutputError, StationError
+from dbbstation.facts import picked
 from dbbstation.facts.serialise import AsItIs, Kept, json_of, plain
 from dbbstation.files.atomic import write_bytes
 from dbbstation.files.provenance import Provenance, from_python, write_table
+from dbbstation.text.written import words
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -59,9 +61,13 @@ class Framed:
     drawing: Annotated[Callable[[object], Any] | None, AsItIs, Kept] = field(default=None, repr=False, compare=False)
     notes: Annotated[tuple[str, ...], Kept] = field(default=(), repr=False)
 
+    _table_of: ClassVar[tuple[str, str]]
+    """Field whose items are the rows of the main table, and their fields that are its columns."""
+
     def rows(self) -> list[dict[str, object]]:
         """Return the main table, one dictionary per row, with units in the names."""
-        raise NotImplementedError
+        items, columns = self._table_of
+        return [picked(one, *words(columns)) for one in getattr(self, items)]
 
     def sentences(self) -> list[str]:
         """Return the sentences above a notebook's table; empty if the table is the answer."""

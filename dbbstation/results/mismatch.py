@@ -12,7 +12,7 @@ from pydantic import Field
 from dbbstation.diagnosis.table.mismatch import RefittedParameter
 from dbbstation.diagnosis.table.next_measurement import Next, next_measurements
 from dbbstation.diagnosis.table.words import sentence_of
-from dbbstation.facts import of_facts, picked
+from dbbstation.facts import of_facts
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value, finite
 from dbbstation.files.csv_rows import table_csv
@@ -137,6 +137,7 @@ class MismatchResult(Framed):
     corrected: Annotated[str | None, Absent] = None
     figure: Annotated[str | None, Absent] = None
     table: Annotated[Mapping[str, tuple[str | float, ...]], AsItIs, Kept]
+    _table_of = "findings", "name, verdict, probability, log_bayes_factor, rms, confounded, text"
 
     def sentences(self) -> list[str]:
         """Return the answer in three levels, in words."""
@@ -147,11 +148,6 @@ class MismatchResult(Framed):
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
         write_table(path, table_csv(list(self.table), list(self.table.values())), provenance, force=force)
-
-    def rows(self) -> list[dict[str, object]]:
-        """Return one row per effect."""
-        shown = ("name", "verdict", "probability", "log_bayes_factor", "rms", "confounded", "text")
-        return [picked(one, *shown) for one in self.findings]
 
 
 def mismatch_result(

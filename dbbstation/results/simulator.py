@@ -11,7 +11,7 @@ from dbbstation.diagnosis.simulator.answer import RefittedOfSimulator
 from dbbstation.diagnosis.simulator.nodes import spread_of
 from dbbstation.diagnosis.simulator.separate import SeparatingInput
 from dbbstation.diagnosis.table.words import CONFOUNDED
-from dbbstation.facts import of_facts, picked
+from dbbstation.facts import of_facts
 from dbbstation.facts.serialise import Absent, Kept
 from dbbstation.facts.value import Value, finite
 from dbbstation.files.atomic import write_text
@@ -154,6 +154,7 @@ class SimulatorResult(Framed):
     figure: Annotated[str | None, Absent] = None
     code: Annotated[str, Kept] = ""
     rows_csv: Annotated[str, Kept] = ""
+    _table_of = "findings", "name, verdict, port, probability, log_bayes_factor, rms, confounded, text"
 
     def sentences(self) -> list[str]:
         """Return the answer in three levels, in words."""
@@ -161,11 +162,6 @@ class SimulatorResult(Framed):
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:  # noqa: ARG002 - code states none
         write_text(path, self.code, force=force)
-
-    def rows(self) -> list[dict[str, object]]:
-        """Return one row per term."""
-        shown = ("name", "verdict", "port", "probability", "log_bayes_factor", "rms", "confounded", "text")
-        return [picked(one, *shown) for one in self.findings]
 
 
 def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -> SimulatorResult:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command, figure
-from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_runs, print_table
+from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, echo_each, print_runs, print_table
 from dbbstation.facts.digits import decimals_of, to_its_place
 from dbbstation.results.words import fit_sentences, outlier_sentence, residual_lines, use_sentence, visibility_sentences
 from dbbstation.tasks.calibrate import calibrate as task
@@ -73,12 +73,10 @@ def show(result: CalibrationResult) -> None:
     echo()
     _print_parameters(result)
     echo()
-    for text in (*visibility_sentences(result), *fit_sentences(result)):
-        echo(text)
+    echo_each((*visibility_sentences(result), *fit_sentences(result)))
     for check in result.scatter:
         _print_scatter(check, missing_physics=result.misfit.missing_physics)
-    for text in residual_lines(result):
-        echo(text)
+    echo_each(residual_lines(result))
     print_currents(result.motor_currents)
     echo(use_sentence(result))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.cli.declared import CommandOutput, command, figure
-from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_table
+from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, echo_each, print_table
 from dbbstation.facts.digits import expanded_uncertainty, with_uncertainty
 from dbbstation.tasks.circles import circles as task
 from dbbstation.tasks.declare import Option
@@ -53,15 +53,14 @@ def _print(result: CirclesResult, *, several: bool) -> None:
     for run in result.runs:
         name = [*([run.session] if several else []), *run.key]
         if isinstance(run, RunWithoutCircle):
-            rows.append([*name, *["-"] * (len(head) + len(titles) - len(name))])
+            rows.append([*name, *["-"] * (len(titles) - len(run.key))])
             continue
-        steps = [abs(step.height_um) for step in run.reversal_steps]
         drift = run.drift_um_per_turn
         rows.append(
             [
                 *name,
                 *_figures(run, _OF_RUN),
-                max(steps) if steps else "-",
+                max((abs(step.height_um) for step in run.reversal_steps), default="-"),
                 "-" if run.closure is None else run.closure.height_um,
                 "-" if drift is None else drift,
                 _fixed(run.noise_um.of_a_reading),
@@ -76,8 +75,7 @@ def _print(result: CirclesResult, *, several: bool) -> None:
             rows.append([*name, pair.test, pair.repeat, *_figures(pair, _OF_PAIR), pair.h_deg])
         print_table([*head, "test", "n", *_titles(_OF_PAIR), "at [deg]"], rows)
     echo("\nG, F and H exclude the contribution of noise; --budget states this contribution.")
-    for line in why_not(result):
-        echo(line)
+    echo_each(why_not(result))
 
 
 _OF_RUN = ("G", "G(LS)", "Fmax", "Fmin", "X", "Y")

@@ -48,22 +48,18 @@ def _print_runs(result: ComparisonResult) -> None:
             f"{run.found_sigmas:.0f}",
             f"{run.rms_um:.2f}",
             f"{run.noise_rms_um:.2f}",
-            *(_tenths(shift) for shift in run.centre_shift_um),
+            *run.centre_shift_um,
             f"{run.centre_shift_uncertainty_um:.1f}",
-            _tenths(run.mean_radial_change_um),
+            run.mean_radial_change_um,
             f"{run.mean_radial_change_uncertainty_um:.1f}",
             f"{run.circularity_um:.1f}",
-            _tenths(run.peak_um),
+            run.peak_um,
             f"{run.peak_theta_deg:.0f}",
             "differs" if run.differs else "",
         ]
         for run in result.runs
     ]
     print_table(titles, rows)
-
-
-def _tenths(value: float) -> str:
-    return f"{round(value, 1) + 0.0:.1f}"
 
 
 def _print_causes(result: ComparisonResult) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import click
 
 from dbbstation.cli.declared import Answer, made
-from dbbstation.cli.output import echo, print_table, say
+from dbbstation.cli.output import echo, echo_each, print_table, say
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Names, Option
 from dbbstation.tasks.options import numbers_of
@@ -160,5 +160,4 @@ def _um(value: float | None) -> str:
 
 def _print(title: str, lines: Sequence[str]) -> None:
     echo(f"\n{title}:")
-    for line in lines:
-        echo(f"  {line}")
+    echo_each(f"  {line}" for line in lines)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 import click
 
-from dbbstation.cli.output import echo, format_of, known_format, print_json, print_result, provenance, say
+from dbbstation.cli.output import echo_each, format_of, known_format, print_json, print_result, provenance, say
 from dbbstation.cli.progress import count_bar, task_bar
 from dbbstation.cli.shop import ShopOption
 from dbbstation.errors import ArgumentError, OutputError
@@ -167,8 +167,7 @@ class Answer:
         elif callable(self.words):
             self.words()
         else:
-            for line in self.words:
-                echo(line)
+            echo_each(self.words)
 
 
 def made(

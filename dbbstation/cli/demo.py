@@ -92,7 +92,7 @@ def _print(result: DemoResult) -> None:
     from dbbstation.facts.value import Value
 
     echo("\n      centre deviation  mean radial error  circular deviation G   [µm, measured]")
-    rows: list[list[object]] = [[run.test, *(size for sizes in _sizes(run) for size in sizes)] for run in result.runs]
+    rows: list[list[object]] = [[run.test, *_sizes(run)] for run in result.runs]
     means: list[object] = ["mean", *_means(result.runs)]
     print_table(["test", "before", "after", " before", " after", "  before", "  after"], [*rows, means])
     echo("before: nominal programs; after: programs compensated with the joint model")
@@ -150,11 +150,11 @@ _CONTENTS = (
 )
 
 
-def _sizes(run: DemoCircle) -> tuple[tuple[float, float], ...]:
+def _sizes(run: DemoCircle) -> list[float]:
     names = ("centre_deviation_um", "mean_radial_error_um", "circularity_30_upr_um")
-    return tuple((getattr(run.before, name), getattr(run.after, name)) for name in names)
+    return [getattr(one, name) for name in names for one in (run.before, run.after)]
 
 
 def _means(runs: Sequence[DemoCircle]) -> list[float]:
-    columns = zip(*([abs(size) for sizes in _sizes(run) for size in sizes] for run in runs), strict=True)
+    columns = zip(*(map(abs, _sizes(run)) for run in runs), strict=True)
     return [sum(column) / len(column) for column in columns]

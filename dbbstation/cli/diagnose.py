@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.cli.declared import CommandOutput, command, figure, save
 from dbbstation.cli.effects import SAID, cancelling_text, print_locations, probability_text
-from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_table, say
+from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, echo_each, print_table, say
 from dbbstation.facts.digits import expanded_uncertainty, with_uncertainty
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.words import ending_sentences, mismatch_sentence, outlier_sentence
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.effects import CauseEffect, WorkspaceError
     from dbbstation.diagnosis.findings import Curve, SourceFinding
-    from dbbstation.model.identified import IdentifiedModel
     from dbbstation.results.diagnosis import DiagnosisFigures, DiagnosisResult
 
 
@@ -71,12 +70,6 @@ def _pair(value: float | None, u: float | None) -> tuple[str, str]:
     return with_uncertainty(value, expanded_uncertainty(u, COVERAGE_FACTOR))
 
 
-def say_model_warnings(identified: IdentifiedModel) -> None:
-    """Print a model's warnings, one line each."""
-    for warning in model_warnings(identified):
-        say(f"note: {warning}")
-
-
 EFFECTS = "Rank causes by their contribution to the circles, with cures and the circles without each cause."
 
 
@@ -88,9 +81,9 @@ def show(result: DiagnosisResult, *, effects: Annotated[bool, Option(EFFECTS)] =
 
 
 def _write(result: DiagnosisResult, path: Path, *, force: bool) -> None:
-
     save(result, path, force=force)
-    say_model_warnings(result.model)
+    for warning in model_warnings(result.model):
+        say(f"note: {warning}")
 
 
 UNPREDICTABLE_UM = 1000.0
@@ -98,9 +91,11 @@ UNPREDICTABLE_UM = 1000.0
 
 
 def _print(result: DiagnosisFigures) -> None:
-    _print_mismatch(result)
-    for outlier in result.outliers:
-        echo(outlier_sentence(outlier))
+    if result.held_out_worse:
+        echo("Held-out tests are predicted worse than by the kinematic calibration alone.\n")
+    echo("\n".join((*result.sentences(), "")))
+    echo(f"{mismatch_sentence(result)}\n")
+    echo_each(map(outlier_sentence, result.outliers))
     _print_sources(result.sources)
     if result.cancelling:
         echo(f"\n{cancelling_text(result.cancelling)}")
@@ -117,16 +112,7 @@ def _print(result: DiagnosisFigures) -> None:
     echo(result.unexplained.text)
     if result.unexplained.curve:
         _print_curve(result.unexplained.curve)
-    for text in ending_sentences(result):
-        echo(text)
-
-
-def _print_mismatch(result: DiagnosisFigures) -> None:
-    if result.held_out_worse:
-        echo("Held-out tests are predicted worse than by the kinematic calibration alone.\n")
-    echo("\n".join((*result.sentences(), "")))
-    echo(mismatch_sentence(result))
-    echo()
+    echo_each(ending_sentences(result))
 
 
 def _print_workspace(elsewhere: WorkspaceError) -> None:

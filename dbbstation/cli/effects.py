@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo, echo_each
 from dbbstation.errors import OutputError
 from dbbstation.text.written import listed
 
@@ -81,8 +81,7 @@ def print_left(result: MismatchResult | SimulatorResult, beyond: str = "") -> No
             echo(f"{verdict}: {listed(names, MOST_NAMES)}")
     if result.next:
         echo("\nmeasure next:")
-        for step in result.next:
-            echo(f"  {step.text}")
+        echo_each(f"  {step.text}" for step in result.next)
 
 
 def not_written(out: Path, levels: Levels) -> OutputError:

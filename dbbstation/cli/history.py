@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command
-from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, echo_line, print_table, provenance
+from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, echo_each, echo_line, print_table, provenance
 from dbbstation.cli.shop import shop_settings
 from dbbstation.tasks.history import history as task
 from dbbstation.tasks.telling import silent
@@ -52,8 +52,7 @@ def _print(machine: MachineHistoryResult, found: HistoryResult) -> None:
             f"and {machine.false_alarms_expected:.2g} over this history."
         )
     echo(headline(machine))
-    for line in changes_in_words(machine, found.coverage_factor):
-        echo(f"  {line}")
+    echo_each(f"  {line}" for line in changes_in_words(machine, found.coverage_factor))
     echo(f"\n{EXPANDED}; level: since the last change")
     titles = "quantity, unit, n, last, U, limit, , level, U, verdict, since, by, U"
     print_table(titles, [_row(one, found.coverage_factor) for one in machine.quantities])

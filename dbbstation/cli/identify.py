@@ -6,19 +6,23 @@ from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.effects import SAID, cancelling_text, print_locations, probability_text
-from dbbstation.cli.output import echo, print_table
+from dbbstation.cli.output import echo, echo_each, print_table
 from dbbstation.tasks.drive import identify as task
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.diagnosis.drive.findings import DriveFinding, HeldOutForce
+    from dbbstation.diagnosis.drive.findings import DriveFinding
     from dbbstation.results.drive import DriveResult
 
 
 def show(result: DriveResult) -> None:
     """Print the identified physics."""
-    _print_if_worse(result.held_out_rms_n)
+    if (held := result.held_out_rms_n) and held.worse:
+        echo(
+            f"Everything found predicts held-out parts worse than mass and friction alone: {held.corrected:.3g} N rms against "
+            f"{held.reference:.3g} N."
+        )
     echo("\n".join((*result.sentences(), "")))
     if result.mismatch:
         echo(
@@ -65,18 +69,9 @@ def _print_rest(result: DriveResult) -> None:
         print_locations(result.unexplained.locations[:3])
     if result.cancelling:
         echo(cancelling_text(result.cancelling))
-    for sentence in result.cannot_tell:
-        echo(sentence)
+    echo_each(result.cannot_tell)
     signals = result.signals
     echo(f"band up to {signals.cutoff_hz:.3g} Hz, {signals.samples_compared} samples compared")
-
-
-def _print_if_worse(held: HeldOutForce | None) -> None:
-    if held and held.worse:
-        echo(
-            f"Everything found predicts held-out parts worse than mass and friction alone: {held.corrected:.3g} N rms against "
-            f"{held.reference:.3g} N."
-        )
 
 
 def _print_sources(sources: Sequence[DriveFinding]) -> None:

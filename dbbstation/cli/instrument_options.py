@@ -65,9 +65,8 @@ class ProtocolOptions:
         from dbbstation.instrument.library import load_instrument, with_zero
 
         protocol = load_instrument(self.instrument, self.profile)
-        if self.zero_mm is None and protocol.length.relative:
-            return with_zero(protocol, bar_length_mm)
-        return with_zero(protocol, self.zero_mm)
+        by_bar = self.zero_mm is None and protocol.length.relative
+        return with_zero(protocol, bar_length_mm if by_bar else self.zero_mm)
 
 
 @dataclass(frozen=True, kw_only=True)

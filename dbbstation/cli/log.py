@@ -27,7 +27,7 @@ from dbbstation.system.handles import open_nothing, open_private
 from dbbstation.text.written import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
 LOG = logging.getLogger("dbbstation")
 
@@ -57,19 +57,17 @@ _FORM = _Printable("%(asctime)s %(process)d %(levelname)s %(message)s", "%Y-%m-%
 def attended(command: click.Command) -> click.Command:
     """Let a command write the log once."""
     callback = command.callback
-    if callback is not None and not isinstance(command, click.Group) and not hasattr(callback, "attended"):
-        command.callback = _attended(callback)
-    return command
+    if callback is None or isinstance(command, click.Group) or hasattr(callback, "attended"):
+        return command
 
-
-def _attended(callback: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(callback)
     def call(*args: Any, **named: Any) -> Any:  # noqa: ANN401 - what the command takes and returns
         with _kept(click.get_current_context()):
             return callback(*args, **named)
 
-    call.attended = True  # type: ignore[attr-defined]  # a mark for the function above
-    return call
+    call.attended = True  # type: ignore[attr-defined]  # a mark for this function
+    command.callback = call
+    return command
 
 
 @contextmanager

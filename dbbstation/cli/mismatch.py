@@ -77,7 +77,12 @@ mismatch = command(
 
 def _print(result: MismatchResult) -> None:
     unit, held_out = result.unit, result.held_out_rms
-    _print_first(result)
+    if held_out and held_out.worse and result.levels.follows:
+        _print_worse("rows", held_out.after, held_out.as_simulated, unit)
+    if result.stopped:
+        echo(
+            f"Ended early: {result.stopped}. This is the best answer so far; with fewer columns (--variables) the search is shorter.\n"
+        )
     echo("\n".join((*result.sentences(), "")))
     print_table(
         "variable, kind, unit, from, to",
@@ -88,8 +93,7 @@ def _print(result: MismatchResult) -> None:
     there = [f for f in result.findings if f.verdict in SURELY_FOUND]
     equivalent = {name for f in there for name in f.equivalent}
     likely = [f for f in result.findings if f.verdict == "ambiguous" and f.probability >= LIKELY]
-    likely = [f for f in likely if f.name not in equivalent]
-    there += likely
+    there += [f for f in likely if f.name not in equivalent]
     if there:
         echo()
         _print_findings(there, unit)
@@ -103,16 +107,6 @@ def _print(result: MismatchResult) -> None:
     elif any(f.verdict == "identified" for f in there):
         echo("\nno parts were held out: predictions of the identified causes were not tested.")
     print_left(result)
-
-
-def _print_first(result: MismatchResult) -> None:
-    unit, held_out = result.unit, result.held_out_rms
-    if held_out and held_out.worse and result.levels.follows:
-        _print_worse("rows", held_out.after, held_out.as_simulated, unit)
-    if result.stopped:
-        echo(
-            f"Ended early: {result.stopped}. This is the best answer so far; with fewer columns (--variables) the search is shorter.\n"
-        )
 
 
 def _print_worse(what: str, corrected: float, as_simulated: float, unit: str) -> None:

@@ -89,6 +89,12 @@ def say(text: str) -> None:
     echo(on_one_line(text), err=True)
 
 
+def echo_each(texts: Iterable[str]) -> None:
+    """Print texts, each from a new line."""
+    for text in texts:
+        echo(text)
+
+
 def echo_line(text: str) -> None:
     """Print text on one line, even with line ends in names."""
     echo(on_one_line(text))

@@ -17,7 +17,6 @@ from dbbstation.tasks.declare import Option
 from dbbstation.text.written import repeats_in_order
 
 if TYPE_CHECKING:
-    from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
 
 _Folder = Annotated[Path, Option("of the session.", kind="argument", metavar="FOLDER")]
@@ -81,8 +80,9 @@ def list_runs(folder: _Folder) -> Answer:
 
     def words() -> None:
         print_table("run, started, mounting, state, samples, why", rows)
-        for circle, count in _repeated(read):
-            echo(f"{circle} has {count} accepted runs: all of them count")
+        for circle, count in Counter(f"{run.test} {run.direction}" for run in read.accepted).items():
+            if count > 1:
+                echo(f"{circle} has {count} accepted runs: all of them count")
         echo(f"no accepted run: {', '.join(missing)}" if missing else "every test of the plan has an accepted run")
 
     return Answer(ListedSession(read.name, read.virtual, listed, tuple(missing)), words)
@@ -105,7 +105,7 @@ def accept(
       dbbstation session accept 2026-11-20-hexapod-7 a-cw-2
       dbbstation session accept 2026-11-20-hexapod-7 a-cw-2 --reason "lost samples lie before the turn"
     """
-    return _told(run, _judged(folder, run, accepted=True, reason=reason.strip()))
+    return _judged(folder, run, accepted=True, reason=reason.strip())
 
 
 @made(group=session)
@@ -116,7 +116,7 @@ def reject(folder: _Folder, run: _Run, *, reason: _Reason) -> Answer:
     Examples:
       dbbstation session reject 2026-11-20-hexapod-7 a-cw-2 --reason "chip under the holder"
     """
-    return _told(run, _judged(folder, run, accepted=False, reason=_stated(reason)))
+    return _judged(folder, run, accepted=False, reason=_stated(reason))
 
 
 @made("take-in", session)
@@ -268,25 +268,12 @@ def _at(moment: datetime | None) -> str:
     return "" if moment is None else moment.strftime("%Y-%m-%d %H:%M:%S %Z").strip()
 
 
-def _told(name: str, run: RunEntry) -> Answer:
-    state, reason = run.state.value, run.reason
-    words = [f"{name}: {state}" + (f" ({reason})" if reason else "")]
-    return Answer({"run": name, "state": state, "reason": reason or None}, words)
-
-
-def _repeated(read: SessionFolder) -> list[tuple[str, int]]:
-
-    counted = Counter(f"{run.test} {run.direction}" for run in read.accepted)
-    return [(circle, runs) for circle, runs in counted.items() if runs > 1]
-
-
 def _missing(read: SessionFolder) -> list[str]:
-
     done = {(run.test, run.direction) for run in read.accepted}
     return [f"{name} {direction}" for name, direction in read.plan.runs() if (name, direction) not in done]
 
 
-def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunEntry:
+def _judged(folder: Path, run: str, *, accepted: bool, reason: str) -> Answer:
     import difflib
 
     from dbbstation.files.formats.session import RunState
@@ -302,7 +289,9 @@ def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunE
         entry = entries[run]
         if accepted and not reason and entry.state is not RunState.RECORDING:
             reason = _reason_for(run, writer.session.unusable(entry))
-        return writer.judge(entry, accepted=accepted, reason=reason)
+        judged = writer.judge(entry, accepted=accepted, reason=reason)
+    words = f"{run}: {judged.state.value}" + (f" ({judged.reason})" if judged.reason else "")
+    return Answer({"run": run, "state": judged.state.value, "reason": judged.reason or None}, [words])
 
 
 def _reason_for(run: str, unusable: str) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.grouped import grouped
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.levels import OUT, SURE
 from dbbstation.inference.triangle import ROUNDING, root
@@ -91,11 +92,8 @@ class Alternatives:
 def named_already(comparison: ModelComparison, nameless: Sequence[Variant], named: Iterable[Variant]) -> list[bool]:
     """Return, for each form of an unmodelled effect, whether a named cause contains it within the inaccuracy of its formula."""
     found = np.zeros(len(nameless), dtype=bool)
-    by_size: dict[int, list[Variant]] = {}
-    for variant in named:
-        if variant.form_uncertainty > 0.0 and len(variant.columns) <= BOUNDS.amplitudes_alike:
-            by_size.setdefault(len(variant.columns), []).append(variant)
-    for size, forms in by_size.items():
+    inexact = (v for v in named if v.form_uncertainty > 0.0 and len(v.columns) <= BOUNDS.amplitudes_alike)
+    for size, forms in grouped((len(variant.columns), variant) for variant in inexact).items():
         alike = np.array([k for k, form in enumerate(nameless) if len(form.columns) == size], dtype=np.int64)
         if not len(alike):
             continue

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
+from dbbstation.computing.grouped import grouped
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import SLACK_SHARES, Member, slices_of, with_slack_of
 
@@ -133,10 +134,7 @@ class Posterior:
     @cached_property
     def sets_of(self) -> dict[str, Integers]:
         """Return the places of each cause's sets in `shares`, by name in order."""
-        found: dict[str, list[int]] = {}
-        for place, names in enumerate(self.weights):
-            for name in names:
-                found.setdefault(name, []).append(place)
+        found = grouped((name, place) for place, names in enumerate(self.weights) for name in names)
         return {name: np.array(found[name]) for name in sorted(found)}
 
     def inside(self, names: Iterable[str]) -> Flags:
@@ -422,13 +420,8 @@ class _Search:
     def _with_slack(self, comparison: ModelComparison, members: list[Member]) -> list[Member]:
         if not any(len(member.variant.slack) for member in members):
             return members
-        values = comparison.values(members)
-        found = []
-        for member in members:
-            own = member.width
-            found.append(with_slack_of(member, values[:own]))
-            values = values[len(member.columns) :]
-        return found
+        values, places = comparison.values(members), slices_of(members)
+        return [with_slack_of(m, values[own][: m.width]) for m, own in zip(members, places, strict=True)]
 
 
 class _Beside:
@@ -492,8 +485,6 @@ def _by_other_laws(beside: _Beside, members: Sequence[Member], k: int) -> list[M
 
 def other_laws(member: Member, wanted: Callable[[Variant], bool] = lambda _: True) -> list[Cause]:
     """Return one cause per law that a member does not use, named after the law, with the wanted forms."""
-    laws: dict[str, list[Variant]] = {}
-    for variant in member.cause.variants:
-        if variant.law != member.variant.law and wanted(variant):
-            laws.setdefault(variant.law, []).append(variant)
+    others = (variant for variant in member.cause.variants if variant.law != member.variant.law and wanted(variant))
+    laws = grouped((variant.law, variant) for variant in others)
     return [replace(member.cause, name=law, variants=tuple(some)) for law, some in laws.items()]

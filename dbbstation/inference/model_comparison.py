@@ -17,6 +17,7 @@ import numpy as np
 from scipy.linalg import cho_solve
 from scipy.linalg.lapack import dtrtri, dtrtrs
 
+from dbbstation.computing.grouped import grouped
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.square_root import slices
 from dbbstation.inference.triangle import rms
@@ -241,9 +242,7 @@ class _Forms:
         self.causes, self.ends = causes, np.cumsum([0, *(len(cause.variants) for cause in causes)])
         self.weights = np.array([form.log_weight for form in forms])
         self.slim = [[k for k, v in enumerate(c.variants) if len(v.columns) < BOUNDS.flexible] for c in causes]
-        by_size: dict[int, list[int]] = {}
-        for number, form in enumerate(forms):
-            by_size.setdefault(len(form.columns), []).append(number)
+        by_size = grouped((len(form.columns), number) for number, form in enumerate(forms))
         of_sizes = {size: at(np.array([forms[k].columns for k in some])) for size, some in by_size.items()}
         self.needed: Integers = np.unique(np.concatenate([NO_COLUMNS, *(part.ravel() for part in of_sizes.values())]))
         place = np.zeros(len(gram), dtype=np.int64)

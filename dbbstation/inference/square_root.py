@@ -21,11 +21,12 @@ from scipy.linalg import solve_triangular
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from dbbstation.computing.grouped import grouped
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.triangle import ROUNDING, triangle_of
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
 
@@ -173,14 +174,14 @@ def arrow_of(blocks: Sequence[Block], known: Columns, noise: float) -> Arrow:
     )
 
 
-def triangles_without(
-    blocks: Sequence[Block], known: Columns, noise: float, parts: Sequence[Sequence[int]]
-) -> Iterator[tuple[Floats, Floats, float]]:
-    """Yield, for each part, the information on fitted columns from blocks outside it.
-
-    Yields:
-        Triangular factor, shape (f, f), its target, shape (f,), and the irreducible sum of squares.
-    """
+def chi2_without(
+    blocks: Sequence[Block],
+    known: Columns,
+    noise: float,
+    held: Floats,
+    parts: Sequence[Sequence[int]],
+) -> list[float]:
+    """Return, for each part, the chi-square of priors and blocks outside it."""
     members, border = _split(blocks, known)
     group_of = {place: number for number, (places, _) in enumerate(members) for place in places}
 
@@ -193,6 +194,7 @@ def triangles_without(
     size = max(int(np.sqrt(len(every))), 1)
     bundles = [triangle_of(np.vstack(every[first : first + size])) for first in range(0, len(every), size)]
     priors, total, first_fitted = border.priors(known), len(border.order), border.random
+    towards, found = known.scale[~known.random][:, None] * complement(held).T, []
     for part in parts:
         touched = {group_of[place] for place in part}
         opened = {number // size for number in touched}
@@ -200,8 +202,11 @@ def triangles_without(
         beside = [k for number in opened for k in range(number * size, min((number + 1) * size, len(every)))]
         rows += [left_by(k, set(part)) if k in touched else every[k] for k in beside]
         triangle = triangle_of(np.vstack(rows))
-        root, target = triangle[first_fitted:total, first_fitted:total], triangle[first_fitted:total, -1]
-        yield root, target, float(triangle[total, total] ** 2)
+        target = triangle[first_fitted:total, -1]
+        seen, _ = np.linalg.qr(triangle[first_fitted:total, first_fitted:total] @ towards)
+        rest = target - seen @ (seen.T @ target)
+        found.append(float(triangle[total, total] ** 2) + float(rest @ rest))
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,12 +306,8 @@ def _tied(blocks: Sequence[Block], which: Integers, touched: Integers, own: Flag
     touches = own[touched]
     edges = (np.ones(int(touches.sum())), (which[touches], number + touched[touches]))
     _, label = connected_components(coo_array(edges, shape=(number + total, number + total)), directed=False)
-    columns_of: dict[int, list[int]] = {}
-    for column in np.flatnonzero(own):
-        columns_of.setdefault(int(label[number + column]), []).append(int(column))
-    blocks_of: dict[int, list[int]] = {}
-    for k in range(number):
-        blocks_of.setdefault(int(label[k]), []).append(k)
+    columns_of = grouped((int(label[number + column]), int(column)) for column in np.flatnonzero(own))
+    blocks_of = grouped((int(label[k]), k) for k in range(number))
     return [
         (blocks_of.get(key, []), np.array(columns_of.get(key, []), dtype=np.int64))
         for key in dict.fromkeys([*blocks_of, *columns_of])
@@ -449,23 +450,6 @@ def solve(
         stated_chi2=stated_chi2,
         freedom_used=used,
     )
-
-
-def chi2_without(
-    blocks: Sequence[Block],
-    known: Columns,
-    noise: float,
-    held: Floats,
-    parts: Sequence[Sequence[int]],
-) -> list[float]:
-    """Return, for each part, the chi-square of priors and blocks outside it."""
-    towards = known.scale[~known.random][:, None] * complement(held).T
-    found = []
-    for root, target, floor in triangles_without(blocks, known, noise, parts):
-        seen, _ = np.linalg.qr(root @ towards)
-        rest = target - seen @ (seen.T @ target)
-        found.append(floor + float(rest @ rest))
-    return found
 
 
 def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> Floats:

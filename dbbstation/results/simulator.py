@@ -175,7 +175,7 @@ def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -
         outputs=tuple(
             SimulatedOutput(output.name, output.unit, float(scale), settled.noise.sigma * float(spread * scale))
             for output, scale, spread in zip(
-                model.outputs, answer.work.scales, spread_of(answer.work, settled), strict=True
+                model.outputs, answer.work.scales, spread_of(answer.work, settled.bank), strict=True
             )
         ),
         runs=tuple(SimulatedRun(run.name, len(run)) for run in model.runs),

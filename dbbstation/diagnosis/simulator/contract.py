@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.grouped import grouped
 from dbbstation.diagnosis.simulator.model import SimulationOutcome
 from dbbstation.diagnosis.simulator.ports import Ports, SimulationFault
 from dbbstation.diagnosis.simulator.terms import evaluator
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.model import Model, SimulationRequest
-    from dbbstation.diagnosis.simulator.terms import Evaluate
 
 
 class Simulator(ABC):
@@ -45,10 +45,7 @@ def simulated(simulator: Simulator, model: Model, ask: SimulationRequest) -> Sim
         SimulationFault: outputs do not match the model.
         Exception: raised by the simulator.
     """
-    acting: dict[str, list[Evaluate]] = {}
-    for term in ask.terms:
-        acting.setdefault(term.port, []).append(evaluator(term))
-    ports = Ports(model.ports, acting, records=ask.records)
+    ports = Ports(model.ports, grouped((term.port, evaluator(term)) for term in ask.terms), records=ask.records)
     run = model.runs[ask.run]
     with np.errstate(all="ignore"):
         try:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.simulator.fit import near
-from dbbstation.diagnosis.simulator.nodes import noise_of
+from dbbstation.diagnosis.simulator.nodes import noise_of, spread_of
 from dbbstation.diagnosis.simulator.noise_left import noise_left
 from dbbstation.diagnosis.simulator.search import compared_quickly, search
 from dbbstation.inference.bounds import BOUNDS
@@ -141,9 +141,7 @@ def log_density(
         columns: derivatives by fitted parameters, shape (n, m).
     """
     bank = noise_left(work, residual, columns, rows=channel)
-    noise, kinds = bank.noise, work.output[channel.kept]
-    sizes = np.array([float(np.mean(bank.spread[kinds == k])) for k in range(len(work.model.outputs))])
-    spread = sizes[work.output[rows]]
+    noise, spread = bank.noise, spread_of(work, bank)[work.output[rows]]
     whitening = noise.whitening(replace(channel, kept=rows, apart=1).stretches)
 
     def white(values: Floats) -> Floats:

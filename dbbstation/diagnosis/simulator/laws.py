@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
+from dbbstation.computing.grouped import grouped
 from dbbstation.diagnosis.simulator.terms import MEMORIES, TermForm
-from dbbstation.diagnosis.simulator.work import PerturbedParameter
+from dbbstation.diagnosis.simulator.work import AGREE, PerturbedParameter
 from dbbstation.inference.channel import Law
+from dbbstation.inference.square_root import slices
 from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
@@ -32,31 +34,28 @@ LOOSE_FORM_UNCERTAINTY = 0.1
 LOOSE = frozenset({TermForm.SIGN, TermForm.SLIP, TermForm.PLAY, TermForm.MEMORY})
 
 
+CURVED_MOST = 3.0 * AGREE
+"""Relative difference between responses to two doses that excludes a candidate as too nonlinear."""
+
+
 def laws(
     work: SimulationRuns,
     state: FittedState,
     found: Sequence[Candidate],
     size: float,
-    curved_most: float,
 ) -> tuple[list[Law], dict[str, str]]:
-    """Return candidates as laws linearised about a state, and reasons against other candidates.
-
-    Args:
-        curved_most: relative difference of responses that excludes a candidate.
-    """
+    """Return candidates as laws linearised about a state, and reasons against other candidates."""
     dosed = [one for one in found if not one.tried]
     points = [(one, point) for one in dosed for point in product(*one.grids)]
     answers = work.answers(state, [d for one, point in points for d in _directions(one, point)], size)
-    first, by_point = 0, {}
-    for one, point in points:
-        by_point[(one.name, point)] = slice(first, first + len(one.term.amplitudes))
-        first += len(one.term.amplitudes)
+    places = slices(len(one.term.amplitudes) for one, _ in points)
+    by_point = {(one.name, point): place for (one, point), place in zip(points, places, strict=True)}
     columns, refused = {}, {}
     for one in dosed:
         parts = [by_point[(one.name, point)] for point in product(*one.grids)]
         if not all(answers.seen[part].all() for part in parts):
             refused[one.name] = "the outputs do not answer to it"
-        elif max(float(answers.curved[part].max()) for part in parts) > curved_most:
+        elif max(float(answers.curved[part].max()) for part in parts) > CURVED_MOST:
             refused[one.name] = "the answers to two small doses of it do not agree"
         else:
             columns[one.name] = np.stack([answers.columns[:, part] for part in parts])
@@ -86,13 +85,9 @@ def departures(work: SimulationRuns, state: FittedState, found: Sequence[Candida
     """Return the slack that other terms give at a state; terms without effect are omitted."""
     points = [(one, point) for one in found for point in product(*(grid[::EVERY] for grid in one.grids))]
     answers = work.answers(state, [d for one, point in points for d in _directions(one, point)], size)
-    off: dict[tuple[str, TermForm, tuple[str, ...]], list[Floats]] = {}
-    first = 0
-    for one, _ in points:
-        own = slice(first, first + len(one.term.amplitudes))
-        first = own.stop
-        if answers.seen[own].all():
-            off.setdefault(departing(one), []).append(answers.columns[:, own])
+    own = slices(len(one.term.amplitudes) for one, _ in points)
+    seen = ((one, place) for (one, _), place in zip(points, own, strict=True) if answers.seen[place].all())
+    off = grouped((departing(one), answers.columns[:, place]) for one, place in seen)
     return {key: of_unit_size(parts) for key, parts in off.items()}
 
 

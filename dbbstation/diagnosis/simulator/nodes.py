@@ -23,7 +23,7 @@ from dbbstation.diagnosis.simulator.laws import (
     of_unit_size,
 )
 from dbbstation.diagnosis.simulator.noise_left import channel_of, noise_left
-from dbbstation.diagnosis.simulator.work import AGREE, FittedState, RanAwayError
+from dbbstation.diagnosis.simulator.work import FittedState, RanAwayError
 from dbbstation.inference.bank import alike
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Base, Law
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.laws import Departures
     from dbbstation.diagnosis.simulator.terms import Term
     from dbbstation.diagnosis.simulator.work import SimulationRuns
+    from dbbstation.inference.bank import Bank
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settle import Settled
@@ -84,7 +85,7 @@ class Node:
     @cached_property
     def asked(self) -> tuple[list[Law], dict[str, str]]:
         """Return laws of candidates that are not inserted, and reasons against the remaining ones."""
-        return laws(self.work, self.fitted.state, self.outside, self.size, CURVED_MOST)
+        return laws(self.work, self.fitted.state, self.outside, self.size)
 
     @cached_property
     def off(self) -> Departures:
@@ -170,9 +171,6 @@ SHARES = (1.0, 0.3, 0.1)
 
 MOST_SHARE = 2.0
 """Largest starting value over the largest simulated size; beyond, the response is unknown."""
-
-CURVED_MOST = 3.0 * AGREE
-"""Relative difference between responses to two doses that excludes a candidate as too nonlinear."""
 
 
 @dataclass(frozen=True)
@@ -331,7 +329,7 @@ def noise_of(settled: Settled) -> tuple[Weigh, float]:
     return settled.bank.whitened, settled.noise.innovation
 
 
-def spread_of(work: SimulationRuns, settled: Settled) -> Floats:
+def spread_of(work: SimulationRuns, bank: Bank) -> Floats:
     """Return outputs' relative noise, shape (o,)."""
-    kinds, spread = work.output[settled.channel.kept], settled.bank.spread
+    kinds, spread = work.output[bank.channel.kept], bank.spread
     return np.array([float(np.mean(spread[kinds == k])) for k in range(len(work.model.outputs))])

@@ -93,7 +93,7 @@ def _tried(nodes: Nodes, found: SearchOutcome, pair: tuple[str, str]) -> tuple[T
     trials = trial_inputs(nodes.work.model)
     if not trials:
         return None, 0.0, 0.0
-    noise = found.settled.noise.effective * spread_of(nodes.work, found.settled)
+    noise = found.settled.noise.effective * spread_of(nodes.work, found.settled.bank)
     try:
         terms = [_term(found, name) for name in pair]
         sigmas = [apart(nodes.work, trial, found.state, terms, noise) for trial in trials]

@@ -29,7 +29,8 @@ def stood_for(monkeypatch, noise, tails, spread, known=None):
         rows = (values[~held].T / spread[outputs[~held]]).T
         return rows if whitening is None else whitening @ rows
 
-    bank = SimpleNamespace(noise=noise, tails=tails, spread=spread[outputs[~held]], whitened=whitened)
+    seen = spread[outputs[~held]]
+    bank = SimpleNamespace(channel=channel, noise=noise, tails=tails, spread=seen, whitened=whitened)
     monkeypatch.setattr(held_parts, "noise_left", lambda *_args, **_named: bank)
     parameters = SimulatorParameter("a", "a", 0.0, uncertainty=known), SimulatorParameter("b", "b", 0.0)
     work = SimpleNamespace(output=outputs, model=Model("", parameters, (), (Output("x", "m"), Output("y", "m")), ()))

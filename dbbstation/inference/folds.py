@@ -77,35 +77,22 @@ def errors_without(
 
     def without(names: Collection[str]) -> HeldOut:
         active = np.flatnonzero(~np.isin(owner, list(names)))
-        return _held_out(blocks, groups, known, active, base, noise, held, single)
+        used = Columns(known.prior[active], known.scale[active], known.random[active] & (active < base))
+        wide = np.hstack([held, np.zeros((len(held), len(active) - base))])
+        thin = [_restricted(block, active) for block in blocks]
+        square, count, weighted, rows = 0.0, 0, 0.0, 0
+        for group in sorted(set(groups)):
+            kept = [b for b, g in zip(thin, groups, strict=True) if g != group]
+            out = [b for b, g in zip(thin, groups, strict=True) if g == group]
+            fitted = solve(kept, used, noise, wide)
+            square += _left(out, used, fitted.x, noise)
+            count += sum(block.count for block in out)
+            inside, degrees = _weighted(out, fitted, noise if single is None else single)
+            weighted += inside
+            rows += degrees
+        return HeldOut(float(np.sqrt(square / count)), float(np.sqrt(weighted / max(rows, 1))))
 
     return without
-
-
-def _held_out(
-    blocks: Sequence[Block],
-    groups: Sequence[int],
-    known: Columns,
-    active: Integers,
-    base: int,
-    noise: float,
-    held: Floats,
-    single: float | None,
-) -> HeldOut:
-    used = Columns(known.prior[active], known.scale[active], known.random[active] & (active < base))
-    held = np.hstack([held, np.zeros((len(held), len(active) - base))])
-    thin = [_restricted(block, active) for block in blocks]
-    square, count, weighted, rows = 0.0, 0, 0.0, 0
-    for group in sorted(set(groups)):
-        kept = [b for b, g in zip(thin, groups, strict=True) if g != group]
-        out = [b for b, g in zip(thin, groups, strict=True) if g == group]
-        fitted = solve(kept, used, noise, held)
-        square += _left(out, used, fitted.x, noise)
-        count += sum(block.count for block in out)
-        inside, degrees = _weighted(out, fitted, noise if single is None else single)
-        weighted += inside
-        rows += degrees
-    return HeldOut(float(np.sqrt(square / count)), float(np.sqrt(weighted / max(rows, 1))))
 
 
 def _restricted(block: Block, active: Integers) -> Block:

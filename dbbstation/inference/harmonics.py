@@ -92,8 +92,13 @@ def basis(phase_rad: Floats, highest: int) -> Floats:
 
 def _waves(phase_rad: Floats, highest: int) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Return waves whose products are harmonics a + q b, ten times faster than cosines."""
-    q, first = BOUNDS.harmonics_at_once, np.exp(1j * phase_rad)
-    return _powers(first, min(q, highest + 1)), _powers(np.exp(1j * q * phase_rad), highest // q + 1)
+    coarse, fine = _counts(highest)
+    return _powers(np.exp(1j * phase_rad), fine), _powers(np.exp(1j * BOUNDS.harmonics_at_once * phase_rad), coarse)
+
+
+def _counts(highest: int) -> tuple[int, int]:
+    """Return the numbers of coarse and fine waves, of q b and of a."""
+    return highest // BOUNDS.harmonics_at_once + 1, min(BOUNDS.harmonics_at_once, highest + 1)
 
 
 def _powers(wave: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
@@ -105,10 +110,7 @@ def _powers(wave: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
 
 
 def _sums(values: Sequence[Floats], phase_rad: Floats, highest: int) -> list[NDArray[np.complex128]]:
-    total = np.zeros(
-        (len(values), highest // BOUNDS.harmonics_at_once + 1, min(BOUNDS.harmonics_at_once, highest + 1)),
-        dtype=np.complex128,
-    )
+    total = np.zeros((len(values), *_counts(highest)), dtype=np.complex128)
     for rows in _stretches(len(phase_rad)):
         fine, coarse = _waves(phase_rad[rows], highest)
         for k, column in enumerate(values):
@@ -153,12 +155,8 @@ def smooth_of(several: Sequence[Floats], phase_rad: Floats, highest: int) -> lis
     """Return several smoothed residuals at equal phases."""
     if not several:
         return []
-    padded = np.zeros(
-        (len(several), (highest // BOUNDS.harmonics_at_once + 1) * min(BOUNDS.harmonics_at_once, highest + 1)),
-        dtype=np.complex128,
-    )
-    padded[:, : highest + 1] = amplitudes_of(several, phase_rad, highest)
-    parts = padded.reshape(len(several), highest // BOUNDS.harmonics_at_once + 1, -1)
+    parts = np.zeros((len(several), *_counts(highest)), dtype=np.complex128)
+    parts.reshape(len(several), -1)[:, : highest + 1] = amplitudes_of(several, phase_rad, highest)
     found = [np.empty(len(phase_rad)) for _ in several]
     for rows in _stretches(len(phase_rad)):
         fine, coarse = _waves(phase_rad[rows], highest)

@@ -387,19 +387,14 @@ def difference_of(
     classes: tuple[Followed, ...],
     gains: DensityGains | None,
     doubts: tuple[str, ...],
-    rest: tuple[float, bool, float, tuple[Detectable, ...]],
     *,
     correction: bool | None = None,
-) -> DifferenceFound:
-    """Derive answer 1 from answers 2 and 3.
+) -> tuple[Differs, str]:
+    """Derive answer 1, with its reason, from answers 2 and 3.
 
     A single event is no evidence together with effects that other rows refute, because the event may only compensate
     for these.
-
-    Args:
-        rest: size of interest, whether it is stated, independent samples, detectable sizes.
     """
-    matters, stated, samples, detectable = rest
     answer, why = Differs.NO, ""
     if probability >= SURE:
         answers = {one.answer for one in classes}
@@ -414,17 +409,7 @@ def difference_of(
         answer, why = Differs.CANNOT_TELL, doubts[0]
     elif probability > ABSENT:
         why = f"something may be there, at probability {probability:.2f}"
-    return DifferenceFound(
-        answer,
-        why,
-        probability,
-        matters,
-        stated,
-        samples,
-        detectable,
-        None if gains is None else gains.total,
-        None if gains is None else gains.without_best,
-    )
+    return answer, why
 
 
 Said = tuple[Verdict, tuple[str, ...], str]

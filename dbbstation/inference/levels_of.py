@@ -35,6 +35,7 @@ from dbbstation.inference.levels import (
     TIME,
     DensityGains,
     Detectable,
+    DifferenceFound,
     Followed,
     FollowsAnswer,
     LawForm,
@@ -409,13 +410,17 @@ def levels_of(
         rows = np.array([one.sum() for one in parts.rows])
         errors = np.square(parts.errors_with(corrects_of(classes)))
         correction = root(float(rows @ errors / rows.sum())) < reference
-    differs = difference_of(
-        probability_of_any(settled),
-        classes,
-        None if parts is None else parts.of(None).gains,
-        (*doubts, *_doubts(settled, left, sizes, size)),
-        (size, matters is not None, samples, sizes),
-        correction=correction,
+    probability, gains = probability_of_any(settled), None if parts is None else parts.of(None).gains
+    doubts = (*doubts, *_doubts(settled, left, sizes, size))
+    differs = DifferenceFound(
+        *difference_of(probability, classes, gains, doubts, correction=correction),
+        probability,
+        size,
+        matters is not None,
+        samples,
+        sizes,
+        None if gains is None else gains.total,
+        None if gains is None else gains.without_best,
     )
     return Levels(differs, classes, correction)
 

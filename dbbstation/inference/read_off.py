@@ -149,9 +149,8 @@ def with_jackknife(
     """
     every = {}
     for name, value in found.items():
-        parts = np.array([(part[name].value, part[name].uncertainty) for part in without if name in part]).reshape(
-            -1, 2
-        )
+        others = [(part[name].value, part[name].uncertainty) for part in without if name in part]
+        parts = np.array(others).reshape(-1, 2)
         own, there = np.square(value.uncertainty), max(len(parts), 1)
         variances = np.maximum(np.square(parts[:, 1]), own / most)
         u = weighted_jackknife(np.array(value.value), np.array(own), parts[:, 0], variances)

@@ -248,16 +248,16 @@ def followed(answer):
     ],
 )
 def test_whether_anything_differs(probability, classes, gains, doubts, answer):
-    assert difference_of(probability, classes, gains, doubts, (1.0, False, 100.0, ())).answer is answer
+    assert difference_of(probability, classes, gains, doubts)[0] is answer
 
 
 def test_what_happened_beside_refuted_effects_is_no_difference():
     """It can make up for them: one in ten parts is then predicted worse than as simulated, and nothing else speaks for it."""
     classes = (followed(FollowsAnswer.DOES_NOT_PREDICT), followed(FollowsAnswer.HAPPENED))
-    gains, rest = DensityGains((-1.0, -2.0)), (1.0, False, 100.0, ())
-    assert difference_of(0.99, classes, gains, (), rest, correction=False).answer is Differs.CANNOT_TELL
-    assert difference_of(0.99, classes, gains, (), rest, correction=True).answer is Differs.YES
-    assert difference_of(0.99, classes[1:], gains, (), rest, correction=False).answer is Differs.YES
+    gains = DensityGains((-1.0, -2.0))
+    assert difference_of(0.99, classes, gains, (), correction=False)[0] is Differs.CANNOT_TELL
+    assert difference_of(0.99, classes, gains, (), correction=True)[0] is Differs.YES
+    assert difference_of(0.99, classes[1:], gains, (), correction=False)[0] is Differs.YES
 
 
 @pytest.mark.parametrize(("parts", "named"), [((3.0, 2.0, 1.0), True), ((3.0, 0.0, -0.5), False), ((0.0,) * 3, True)])

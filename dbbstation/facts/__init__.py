@@ -20,6 +20,14 @@ def picked(one: object, *names: str) -> dict[str, object]:
     return {name: getattr(one, name) for name in names}
 
 
+@dataclass(frozen=True)
+class BeforeAfter:
+    """A figure with the earlier model (before) and with all findings (after)."""
+
+    before: float
+    after: float
+
+
 class NamedRun:
     """What has a run's test, direction and repeat."""
 

@@ -11,13 +11,12 @@ from pydantic import Field
 from dbbstation.computing.arrays import median_of, sum_of
 from dbbstation.diagnosis.compare.findings import DirectionHalves, LargestEffect, RunDifference
 from dbbstation.diagnosis.compare.pairs import NotComparable
-from dbbstation.facts import of_facts
+from dbbstation.facts import BeforeAfter, of_facts
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import Cancelling
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.levels import Gains, Levels, Verdict
 from dbbstation.inference.read_off import Span
-from dbbstation.results.diagnosis import BeforeAfter
 from dbbstation.results.frame import Framed
 from dbbstation.results.levels_text import level_sentences
 

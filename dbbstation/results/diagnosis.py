@@ -11,7 +11,7 @@ from dbbstation.calibration.outliers.outlier import SOURCE_OF, Outlier, OutlierK
 from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.diagnosis.effects import CauseEffect, WorkspaceError
 from dbbstation.diagnosis.findings import Location, NextTest, Shift, SourceFinding, Unexplained
-from dbbstation.facts import OfRun, of_facts
+from dbbstation.facts import BeforeAfter, OfRun, of_facts
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import Cancelling
 from dbbstation.inference.levels import Acts, Levels, LimitReached, Verdict
@@ -27,19 +27,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class BeforeAfter:
-    """A figure with the kinematic calibration (before) and with the joint model (after)."""
-
-    before: float
-    after: float
-
-
-@dataclass(frozen=True)
-class CircularityLeft(OfRun):
+class CircularityLeft(BeforeAfter, OfRun):
     """Residual circularity of one run [µm]."""
-
-    before: float
-    after: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

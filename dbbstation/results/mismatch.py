@@ -12,7 +12,7 @@ from pydantic import Field
 from dbbstation.diagnosis.table.mismatch import RefittedParameter
 from dbbstation.diagnosis.table.next_measurement import Next, next_measurements
 from dbbstation.diagnosis.table.words import sentence_of
-from dbbstation.facts import of_facts
+from dbbstation.facts import BeforeAfter, of_facts
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value, finite
 from dbbstation.files.csv_rows import table_csv
@@ -83,14 +83,6 @@ class NoiseResult:
 
 
 @dataclass(frozen=True)
-class ResidualRms:
-    """Rms of measured minus simulated values, in the table's unit."""
-
-    before: float
-    after: float
-
-
-@dataclass(frozen=True)
 class HeldOutRms:
     """Errors of all held-out parts, in the table's unit.
 
@@ -124,7 +116,7 @@ class MismatchResult(Framed):
     mismatch: bool
     offset: OffsetResult | None
     noise: NoiseResult
-    residual_rms: ResidualRms
+    residual_rms: BeforeAfter
     held_out: str
     held_out_rms: HeldOutRms | None
     cancelling: Cancelling | None
@@ -172,7 +164,7 @@ def mismatch_result(
         mismatch=found.is_there,
         offset=found.offset and OffsetResult(**vars(found.offset), significant=found.offset_is_there),
         noise=_noise(found),
-        residual_rms=ResidualRms(found.rms_before, found.rms_after),
+        residual_rms=BeforeAfter(found.rms_before, found.rms_after),
         held_out="not-tested" if found.held_out is None else "tested",
         held_out_rms=found.held_out and of_facts(HeldOutRms, found.held_out, worse=found.is_worse),
         findings=tuple(replace(one, text=sentence_of(found, one)) for one in found.findings),

@@ -15,9 +15,10 @@ import pytest
 from dbbstation.cli import cli
 from dbbstation.cli.diagnose import _print as print_diagnosis
 from dbbstation.diagnosis.findings import Shift, SourceFinding, Unexplained
+from dbbstation.facts import BeforeAfter
 from dbbstation.files.places import shipped_folder
 from dbbstation.inference.levels import DifferenceFound, Differs, Levels, Verdict
-from dbbstation.results.diagnosis import BeforeAfter, DiagnosisFigures
+from dbbstation.results.diagnosis import DiagnosisFigures
 from tests.cli.conftest import Outcome, call
 from tests.once import OF_TABLES, STUDIES, computed_once
 from tests.plant.mechanisms.kinematics import Kinematics

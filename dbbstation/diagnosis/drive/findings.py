@@ -9,6 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from dbbstation.computing.arrays import Floats
+from dbbstation.facts import BeforeAfter
 from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import Cancelling
@@ -130,19 +131,11 @@ class ModelStep:
 
 
 @dataclass(frozen=True)
-class ForceErrors:
-    """Force errors with mass and viscous friction (before), and with all findings (after)."""
-
-    before: float
-    after: float
-
-
-@dataclass(frozen=True)
 class HeldBack:
-    """Prediction errors on a held-out stretch."""
+    """Prediction errors on a held-out stretch, with mass and viscous friction (before), and with all findings (after)."""
 
     t_s: tuple[float, float]
-    relative_force_error: ForceErrors
+    relative_force_error: BeforeAfter
     steps: tuple[ModelStep, ...]
     not_in_model: tuple[str, ...]
 
@@ -241,7 +234,7 @@ class DriveFindings:
     noise_n: float
     noise_correlation_samples: float
     misfit_rms_n: float
-    residual_rms_n: ForceErrors
+    residual_rms_n: BeforeAfter
     held_back: HeldBack
     parameters: Mapping[str, DriveValue]
     parameter_shift: tuple[ParameterBias, ...]

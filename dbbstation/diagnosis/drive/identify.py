@@ -14,7 +14,6 @@ from dbbstation.diagnosis.drive.findings import (
     DriveFinding,
     DriveFindings,
     DriveValue,
-    ForceErrors,
     FrictionCurve,
     HeldBack,
     ModelStep,
@@ -26,6 +25,7 @@ from dbbstation.diagnosis.drive.fit import DriveFit, base_values, fit
 from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.sources import force, variable_of
 from dbbstation.diagnosis.drive.verdicts import VAGUE, DriveLimits, Verdicts, limits_of, mass_is_known, sentences
+from dbbstation.facts import BeforeAfter
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import cancelling_of
 from dbbstation.inference.bounds import BOUNDS
@@ -115,10 +115,10 @@ def identify(
         noise_n=noise.sigma,
         noise_correlation_samples=noise.correlation_samples,
         misfit_rms_n=_beyond(force - base_n, noise.sigma),
-        residual_rms_n=ForceErrors(*(rms(force - one) for one in (base_n, model_n))),
+        residual_rms_n=BeforeAfter(*(rms(force - one) for one in (base_n, model_n))),
         held_back=HeldBack(
             (float(ends[0]), float(ends[1])),
-            ForceErrors(steps[0].relative_force_error, steps[-1].relative_force_error),
+            BeforeAfter(steps[0].relative_force_error, steps[-1].relative_force_error),
             steps,
             tuple(dict.fromkeys(verdicts.source_of(name) for name in named if name not in predicting)),
         ),

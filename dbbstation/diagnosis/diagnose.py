@@ -19,7 +19,7 @@ from dbbstation.diagnosis.locate import after_reversals, locations_of
 from dbbstation.diagnosis.next_test import next_tests
 from dbbstation.diagnosis.shapes import Follows
 from dbbstation.diagnosis.unexplained import curve_of, with_exact_wave
-from dbbstation.diagnosis.verdicts import circle_levels, judge, limits_of, outcome_of, shifts_between, where_left
+from dbbstation.diagnosis.verdicts import CircleJudge, circle_levels, limits_of, outcome_of, shifts_between, where_left
 from dbbstation.errors import ModelError
 from dbbstation.inference.alternatives import EVEN, Alternatives, cancelling
 from dbbstation.inference.bounds import BOUNDS
@@ -98,7 +98,7 @@ def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out
     gains = without_tests(explained, outcome) if hold_out and not stopped else None
     levels = circle_levels(explained, outcome, gains)
     explained = _widened(explained)
-    findings = judge(explained, outcome, gains, levels)
+    findings = CircleJudge(explained, outcome, gains, levels).findings()
     settled, before, outliers = explained.settled, explained.before, explained.outliers
     after, members = settled.after, settled.members
     rivals = [f.name for f in sorted(findings, key=lambda f: -(f.gain or 0.0))[: BOUNDS.found_again]]
@@ -187,9 +187,9 @@ def _unexplained(explained: Explained) -> Unexplained:
 
 def _quick(settled: SettledCircles) -> Unexplained:
     found = after_reversals(settled.unmodelled.runs, settled.after.residual_mm)
-    if found is None or found.probability >= SIGNIFICANT:
+    if found is None or found.louder.probability >= SIGNIFICANT:
         return Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise.")
-    return Unexplained(found.beyond_um, found.strut, Follows("time", "since a reversal"), 0.0, found.text)
+    return Unexplained(1e3 * found.louder.beyond, found.strut, Follows("time", "since a reversal"), 0.0, found.text)
 
 
 def rough_formulas(settled: SettledCircles) -> list[str]:
@@ -334,11 +334,8 @@ def thinned(observation: Observation, most: int = BOUNDS.samples_per_turn) -> Ob
     if len(raw) <= most:
         return observation
     sectors = min(most, max(len(raw) // BOUNDS.samples_per_sector, 1))
-    finer = (
-        _averaged(observation, BOUNDS.samples_of_sharp * sectors)
-        if len(raw) > BOUNDS.samples_of_sharp * sectors
-        else observation
-    )
+    most_fine = BOUNDS.samples_of_sharp * sectors
+    finer = _averaged(observation, most_fine) if len(raw) > most_fine else observation
     return replace(_averaged(finer, sectors), finer=(finer, sector_of(finer.raw, sectors)))
 
 

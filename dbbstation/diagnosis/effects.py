@@ -207,7 +207,7 @@ def effects_of(
             root = _root(covariance[np.ix_(places, places)] - np.diag(of_formulas))
             roots = _parted(group, np.hstack([root, _of_formulas(group, of_formulas)]))
         hidden = None if unseen is None or places is None else _parted(group, unseen[:, places].T)
-        spread = [_answers(observation, lengths[k], group, roots) for k, observation in enumerate(observations)]
+        spread = None if roots is None else [_answers(o, lengths[k], group, roots) for k, o in enumerate(observations)]
         circles = tuple(_circle(o, effect) for o, effect in zip(observations, effects, strict=True))
         texts = group[0].source.texts
         space, space_u = _over_the_workspace(model, without, group, (roots, hidden))
@@ -283,12 +283,10 @@ def _answers(
     observation: Observation,
     reading: BarReading,
     group: Sequence[Fitted],
-    roots: tuple[Floats, ...] | None,
-) -> Floats | None:
+    roots: tuple[Floats, ...],
+) -> Floats:
     """Return changes of the readings by independent parameter changes of one standard deviation, shape (n, r) [mm]."""
-    if roots is None:
-        return None
-    total = np.zeros((len(reading.length_mm), roots[0].shape[1] if roots else 0))
+    total = np.zeros((len(reading.length_mm), roots[0].shape[1]))
     motion = observation.motion()
     for fitted, root in zip(group, roots, strict=True):
         if fitted.shared == fitted.source.shared_by(motion):
@@ -319,14 +317,14 @@ def _circle(observation: Observation, effect_mm: Floats) -> CuredCircle:
 
 def _u_of_mean(
     circles: Sequence[CuredCircle],
-    spread: Sequence[Floats | None],
+    spread: Sequence[Floats] | None,
     changed_um: Callable[[CuredCircle, list[Floats]], Floats],
 ) -> float | None:
     """Return the standard uncertainty of a figure's mean over all runs, from its changes with length; None if unknown."""
+    if spread is None:
+        return None
     found = []
     for circle, answers in zip(circles, spread, strict=True):
-        if answers is None:
-            return None
         length_mm = circle.raw.circle.bar_mm + circle.effect_mm
         found.append(changed_um(circle, [length_mm + change for change in answers.T]))
     each = np.array(found)

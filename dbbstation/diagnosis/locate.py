@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -177,22 +177,20 @@ class AfterReversals:
 
     Attributes:
         strut: 1 to 6.
-        probability: under uniform noise, over all struts and times.
+        louder: sizes [mm], and the probability under uniform noise, over all struts and times.
     """
 
     strut: int
     within_s: float
-    probability: float
-    rms_um: float
-    elsewhere_um: float
-    beyond_um: float
+    louder: Louder
 
     @property
     def text(self) -> str:
         """Return the finding in two sentences."""
+        there_um, elsewhere_um = 1e3 * self.louder.rms, 1e3 * self.louder.elsewhere
         return (
-            f"The residual is larger just after strut {self.strut} turns round: {self.rms_um:.2g} µm rms within {self.within_s:g} s, "
-            f"{self.elsewhere_um:.2g} µm elsewhere. A strut that rings does that; noise that is the same everywhere does not."
+            f"The residual is larger just after strut {self.strut} turns round: {there_um:.2g} µm rms within {self.within_s:g} s, "
+            f"{elsewhere_um:.2g} µm elsewhere. A strut that rings does that; noise that is the same everywhere does not."
         )
 
 
@@ -210,9 +208,8 @@ def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[Floats]) -> A
             one = louder(residual_mm, begins, rows)
             if one is not None:
                 chance = min(1.0, one.probability * STRUTS * len(lengths))
-                sizes_um = 1e3 * one.rms, 1e3 * one.elsewhere, 1e3 * one.beyond
-                found.append(AfterReversals(strut, within_s, chance, *sizes_um))
-    return min(found, key=lambda one: (one.probability, -one.beyond_um), default=None)
+                found.append(AfterReversals(strut, within_s, replace(one, probability=chance)))
+    return min(found, key=lambda one: (one.louder.probability, -one.louder.beyond), default=None)
 
 
 def _reversals(sign: Floats) -> Integers:

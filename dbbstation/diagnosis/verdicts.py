@@ -56,18 +56,13 @@ if TYPE_CHECKING:
     from dbbstation.inference.projection import BesideBase
 
 
-def judge(
-    explained: Explained, outcome: Settled, gains: KnownGains | None, levels: Levels
-) -> tuple[SourceFinding, ...]:
-    """Return one finding per named cause, present ones first.
+class CircleJudge(CauseJudge):
+    """Makes findings on named causes.
 
     Args:
         gains: of held-out tests; None if not tested.
     """
-    return _CircleJudge(explained, outcome, gains, levels).findings()
 
-
-class _CircleJudge(CauseJudge):
     is_catalogue = True
 
     def __init__(self, explained: Explained, outcome: Settled, gains: KnownGains | None, levels: Levels) -> None:
@@ -76,7 +71,7 @@ class _CircleJudge(CauseJudge):
         super().__init__(outcome, Trial(gains), levels)
 
     def findings(self) -> tuple[SourceFinding, ...]:
-        """Return all findings."""
+        """Return one finding per named cause, present ones first."""
         found = [self._source_finding(cause) for cause in self._named.values()]
         return tuple(sorted(found, key=lambda f: (f.verdict.rank, -(f.gain or 0.0))))
 
@@ -167,10 +162,8 @@ class _CircleJudge(CauseJudge):
         }
 
     def _impossible(self, shown: Member, values: Floats, covariance: Floats) -> str:
-        source, found = (
-            self._circles.source_of(shown.name, shown.variant),
-            self._values_of(shown, values, covariance),
-        )
+        source = self._circles.source_of(shown.name, shown.variant)
+        found = self._values_of(shown, values, covariance)
         positive = {p.name: found[p.name] for p in source.parameters(self._circles.machine) if p.positive}
         sigma = {n: float(np.hypot(v.uncertainty, source.form_uncertainty * v.value)) for n, v in positive.items()}
         each = (impossibly_negative(n, v.value, sigma[n], v.unit) for n, v in positive.items())

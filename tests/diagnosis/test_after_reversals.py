@@ -53,13 +53,13 @@ def test_a_strut_that_rings_is_located(tmp_path, ringing):
     record(tmp_path / "s", seed=31, mechanisms=[KINEMATICS, ringing], rate_hz=25.0)
     found = looked_at(tmp_path / "s")
     assert found.strut == ringing.strut
-    assert found.probability < 1e-8
-    assert found.beyond_um > 0.5
+    assert found.louder.probability < 1e-8
+    assert found.louder.beyond > 5e-4
 
 
 def test_noise_alone_follows_no_reversal(tmp_path):
     record(tmp_path / "s", seed=32, mechanisms=[KINEMATICS], rate_hz=10.0, noise=REMEMBERING)
-    assert looked_at(tmp_path / "s").probability > 0.01
+    assert looked_at(tmp_path / "s").louder.probability > 0.01
 
 
 @pytest.mark.slow

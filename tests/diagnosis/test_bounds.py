@@ -10,7 +10,7 @@ import pytest
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.shapes import AWAY_MM, TOWARDS, Spring, ranges, samples_of, shapes
-from dbbstation.diagnosis.verdicts import _CircleJudge
+from dbbstation.diagnosis.verdicts import CircleJudge
 from dbbstation.inference.levels import (
     Acts,
     DifferenceFound,
@@ -114,7 +114,7 @@ def _still(folder, *mechanisms):
 
 @pytest.mark.parametrize(("group", "verdict"), [((), Verdict.NOT_TESTABLE), (("backlash",), Verdict.AMBIGUOUS)])
 def test_only_a_group_of_which_one_is_there_is_ambiguous(group, verdict):
-    judge = object.__new__(_CircleJudge)
+    judge = object.__new__(CircleJudge)
     undecided = Followed((("strut-force",),), (), FollowsAnswer.UNDECIDED, 0.7, {}, 1.0, ("play",))
     levels = Levels(
         DifferenceFound(Differs.YES, "", 1.0, 1.0, matters_stated=False, independent_samples=900.0, detectable=()),

@@ -8,7 +8,7 @@ from scipy.linalg import null_space
 
 from dbbstation.diagnosis.diagnose import thinned, without_doubtful, without_tests
 from dbbstation.diagnosis.explain import explain
-from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
+from dbbstation.diagnosis.verdicts import CircleJudge, circle_levels, outcome_of
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.folds import chosen_anew, in_turn
 from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
@@ -143,7 +143,7 @@ def test_the_probability_of_a_strut_is_that_of_its_forms(both):
 @pytest.mark.slow
 def test_verdicts_are_read_off_the_levels(both):
     explained, outcome, gains, levels = both
-    found = {one.name: one for one in judge(explained, outcome, gains, levels)}
+    found = {one.name: one for one in CircleJudge(explained, outcome, gains, levels).findings()}
     assert found["backlash"].verdict is Verdict.IDENTIFIED
     assert found["gravity"].verdict is Verdict.IDENTIFIED
     assert all(found[name].verdict.rank > Verdict.AMBIGUOUS.rank for name in FEW if name not in {"gravity", "backlash"})

@@ -6,7 +6,7 @@ import pytest
 
 from dbbstation.diagnosis.diagnose import doubtful, thinned, without_doubtful
 from dbbstation.diagnosis.explain import explain
-from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
+from dbbstation.diagnosis.verdicts import CircleJudge, circle_levels, outcome_of
 from dbbstation.inference.alternatives import EVEN
 from dbbstation.inference.levels import Verdict
 from dbbstation.sources.registry import sources_named
@@ -44,7 +44,7 @@ def test_a_drift_of_nobody_knows_what_is_named_by_nobody_and_not_modelled(tmp_pa
     assert doubted in NAMES[1:]
     explained = without_doubtful(explained)
     outcome = outcome_of(explained)
-    findings = judge(explained, outcome, None, circle_levels(explained, outcome, None))
+    findings = CircleJudge(explained, outcome, None, circle_levels(explained, outcome, None)).findings()
     modelled = {term.source.name for term in explained.settled.after.layout.terms} & set(NAMES)
     assert modelled == {"gravity"}
     found = {finding.name: finding for finding in findings}

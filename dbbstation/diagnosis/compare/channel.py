@@ -362,12 +362,8 @@ def of_each_test(sides: Sides) -> Pattern:
         (tuple(range(width * many)), quarter, "each test its own"),
         (tuple(range(width * many, width * len(parts))), quarter, "each run its own"),
         *(
-            (columns, quarter - float(np.log(many)), name)
-            for (name, _), columns in zip(parts[:many], own, strict=False)
-        ),
-        *(
-            (columns, quarter - float(np.log(len(sides.pairs))), name)
-            for (name, _), columns in zip(parts[many:], own[many:], strict=True)
+            (columns, quarter - float(np.log(len(sides.pairs) if k >= many else many)), name)
+            for k, ((name, _), columns) in enumerate(zip(parts, own, strict=True))
         ),
     ]
     variable = Variable("angle, test by test", "deg", Kind.ANGLE, angle, period=360.0)

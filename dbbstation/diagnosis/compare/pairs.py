@@ -236,10 +236,9 @@ class Sides:
         return cls(machine, tuple(pairs), (a, b))
 
     @cached_property
-    def motions(self) -> tuple[tuple[Motion, ...], tuple[Motion, ...]]:
-        """Return motions of these runs."""
-        a, b = ([run.motion() for run in runs] for runs in self.runs)
-        return tuple(a), tuple(b)
+    def motions(self) -> list[list[Motion]]:
+        """Return motions of the runs of A and B."""
+        return [[run.motion() for run in runs] for runs in self.runs]
 
     @cached_property
     def orders(self) -> tuple[Integers, ...]:
@@ -247,17 +246,15 @@ class Sides:
         return tuple(np.argsort(pair.b[0].raw.circle.phi_deg(pair.theta_deg)) for pair in self.pairs)
 
     @cached_property
-    def readings(self) -> tuple[tuple[BarReading, ...], tuple[BarReading, ...]]:
+    def readings(self) -> list[list[BarReading]]:
         """Return nominal readings along the paths of A and B."""
         model = MachineModel(self.machine)
-        a, b = ([model.bar(motion) for motion in motions] for motions in self.motions)
-        return tuple(a), tuple(b)
+        return [[model.bar(motion) for motion in motions] for motions in self.motions]
 
     @cached_property
-    def variables(self) -> tuple[list[dict[str, Floats]], list[dict[str, Floats]]]:
+    def variables(self) -> list[list[dict[str, Floats]]]:
         """Return variables along the paths of A and B."""
-        a, b = ([variables(motion, self.machine) for motion in motions] for motions in self.motions)
-        return a, b
+        return [[variables(motion, self.machine) for motion in motions] for motions in self.motions]
 
     @cached_property
     def blocks(self) -> tuple[slice, ...]:
@@ -279,12 +276,11 @@ class Sides:
         return np.concatenate(found)
 
     @cached_property
-    def _sectors(self) -> tuple[list[Sectors], list[Sectors]]:
-        a, b = (
+    def _sectors(self) -> list[list[Sectors]]:
+        return [
             [Sectors.of(run.raw.theta_deg, len(order)) for run, order in zip(runs, self.orders, strict=True)]
             for runs in self.runs
-        )
-        return a, b
+        ]
 
     def each_row(self, values: Sequence[float]) -> Floats:
         """Return one value per pair as rows, shape (n,)."""

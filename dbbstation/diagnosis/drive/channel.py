@@ -12,7 +12,7 @@ from dbbstation.diagnosis.drive.sources import force, variable_of
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Base, Channel, Kind, Law, Variable
-from dbbstation.inference.forms import Clock, Spline, modulated
+from dbbstation.inference.forms import Spline, modulated
 from dbbstation.inference.levels import SURE, Acts
 from dbbstation.inference.patterns import CURVES, Family, Pattern, of_blocks
 from dbbstation.inference.triangle import axes_of
@@ -113,9 +113,7 @@ def drive_channel(
         known_noise=recordings.edge_noise_n,
         interchangeable=EQUIVALENT**2,
         rows_are="samples",
-        clock=Clock(
-            recordings.time_s / recordings.samples_apart_s, recordings.step_response, recordings.response_reach
-        ),
+        clock=recordings.clock,
         direction=recordings.compared(lambda s: s.direction),
     )
     return DriveChannel(recordings, channel, scale, {s.name: s for s in sources}, of_law, shortest)

@@ -59,14 +59,13 @@ def explain(recordings: Recordings, sources: Sequence[TableSource], progress: Ca
         after = fit(drive, settled, settled.best.members)
         if number == 0:
             first = fit(drive, settled, ())
-        if after.impossible and number < DRIVES.rounds - 1 and len(base) > 1:
-            name = after.impossible[0]
-            value = after.base[name]
-            dropped[name] = (
-                f"{name} would come out at {value.in_words}, which cannot be, and is left out: {POINTS_TO[name]}"
-            )
-            continue
-        break
+        if not after.impossible or number == DRIVES.rounds - 1 or len(base) == 1:
+            break
+        name = after.impossible[0]
+        value = after.base[name]
+        dropped[name] = (
+            f"{name} would come out at {value.in_words}, which cannot be, and is left out: {POINTS_TO[name]}"
+        )
     after = measured(drive, settled, settled.best.members)
     return ExplainedDrive(drive, settled, first, after, dropped)
 

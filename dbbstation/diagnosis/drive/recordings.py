@@ -11,6 +11,7 @@ import numpy as np
 from dbbstation.diagnosis.drive.signals import acceleration_over_two, derivatives, impulse_response, signals_of
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.forms import Clock
 from dbbstation.inference.levels import OUT
 from dbbstation.inference.square_root import slices
 from dbbstation.inference.triangle import left_by, rms
@@ -113,21 +114,14 @@ class Recordings:
         one = self.signals[0]
         return float(np.median(np.diff(one.kept))) / one.rate_hz
 
-    def step_response(self, since: Floats) -> Floats:
-        """Return the low-pass's step response, over samples since the step."""
-        return np.interp(since * self.samples_apart_s, *self._response)
-
     @cached_property
-    def response_reach(self) -> float:
-        """Return the number of samples until the step response is constant."""
-        since, _ = self._response
-        return float(np.abs(since[[0, -1]]).max()) / self.samples_apart_s
-
-    @cached_property
-    def _response(self) -> tuple[Floats, Floats]:
-        one = self.signals[0]
+    def clock(self) -> Clock:
+        """Return the times of compared samples, with the low-pass's step response."""
+        one, apart_s = self.signals[0], self.samples_apart_s
         step = np.cumsum(impulse_response(one.rate_hz, one.cutoff_hz))
-        return (np.arange(len(step)) - len(step) // 2) / one.rate_hz, step
+        since_s = (np.arange(len(step)) - len(step) // 2) / one.rate_hz
+        reach = float(np.abs(since_s[[0, -1]]).max()) / apart_s
+        return Clock(self.time_s / apart_s, lambda since: np.interp(since * apart_s, since_s, step), reach)
 
     @property
     def notes(self) -> list[str]:

@@ -88,10 +88,7 @@ class Table:
         follows = self.variables
         if fitted.simulated_is_variable:
             follows = (*follows, simulated)
-        residual, time_unit = (
-            self.measured - self.simulated,
-            self.clock.unit if self.clock is not None and self.clock.unit else "row",
-        )
+        time_unit = self.clock.unit if self.clock is not None and self.clock.unit else "row"
         laws = [self._law(source) for source in sources]
         if (size := float(np.std(fitted.measured - fitted.simulated))) > 0.0:
             own = Variable(self.simulated_name, self.unit, Kind.ANY, fitted.simulated)
@@ -100,7 +97,7 @@ class Table:
             rows = LawRows(time, time_unit, self.blocks, size, self.unit)
             laws += [*bent_laws(rows, follows, grows), *memory_laws(rows, follows)]
         return Channel(
-            residual=residual,
+            residual=self.measured - self.simulated,
             unit=self.unit,
             blocks=self.blocks,
             names=self.names,

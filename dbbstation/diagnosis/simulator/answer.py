@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.separate import SeparatingInput
     from dbbstation.diagnosis.simulator.terms import Term
     from dbbstation.diagnosis.simulator.work import Run
-    from dbbstation.inference.folds import KnownGains
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.read_off import CauseFinding
@@ -145,9 +144,7 @@ def find(
             folds.extend(predicted_parts(nodes, base, found, stated, progress))
         except BudgetSpentError as error:
             stopped = error.what
-    held_out = HeldOutError(tuple(folds)) if len(folds) >= LEAST_PARTS else None
-    gains = None if held_out is None else gains_of(folds)
-    return _said(nodes, base, found, held_out, as_simulated, stopped, gains=gains, matters=matters)
+    return _said(nodes, base, found, folds, as_simulated, stopped, matters)
 
 
 def _scales(work: SimulationRuns, stated: FittedState) -> Floats:
@@ -166,11 +163,9 @@ def _said(
     nodes: Nodes,
     base: Node,
     found: SearchOutcome,
-    held_out: HeldOutError | None,
+    folds: Sequence[PredictedPart],
     as_simulated: Floats,
     stopped: str,
-    *,
-    gains: KnownGains | None,
     matters: float | None,
 ) -> SimulatorComparison:
     node, settled = found.node, found.settled
@@ -185,7 +180,8 @@ def _said(
     except BudgetSpentError:
         not_asked = {}
     open_to = {name: one for one in found.withstood if one.log_odds > 0.0 for name in one.names}
-    reference = None if held_out is None else held_out.as_simulated
+    held_out = HeldOutError(tuple(folds)) if len(folds) >= LEAST_PARTS else None
+    gains, reference = (None, None) if held_out is None else (gains_of(folds), held_out.as_simulated)
     levels = levels_of(settled, left, gains, matters, reference=reference)
     read = read_off(settled, Trial(gains, refits), levels)
     findings = tuple(_judged(one, found, nonlinear, open_to) for one in read)

@@ -136,16 +136,6 @@ WHOLE = 0.02
 """Largest distance of rounded positions from whole steps, in steps; files round positions again."""
 
 
-def retreat_m(noise_m: float, resolution_m: float) -> float:
-    """Return the retreat that counts as a turn [m].
-
-    Args:
-        noise_m: of position, including jitter at speed.
-        resolution_m: rounding step, zero if unknown; steps above the travel per sample are not white noise.
-    """
-    return RETREAT_SIGMA * noise_m + 1.5 * resolution_m
-
-
 def resolution_of(position: Floats) -> float:
     """Return the position's rounding step, zero if none."""
     steps = np.abs(np.diff(position))

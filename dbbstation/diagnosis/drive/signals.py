@@ -26,9 +26,9 @@ from scipy.ndimage import distance_transform_edt, label, maximum_filter1d
 from scipy.signal import butter, savgol_filter, sosfiltfilt, welch
 
 from dbbstation.diagnosis.drive.sampling import (
+    RETREAT_SIGMA,
     evenly_sampled,
     resolution_of,
-    retreat_m,
     stuck_samples,
     turning_points,
     ways,
@@ -267,7 +267,8 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
         raise CalibrationError(
             "the position does not change", where=recording.name, remedy="record the drive while it travels to and fro"
         )
-    floor = _noise_floor(position, rate)
+    frequency, power = _spectrum(position, rate)
+    floor = float(np.median(power[frequency > 0.375 * rate]))
     cutoff = _chosen_cutoff(position, rate, floor) if cutoff_hz is None else cutoff_hz
     if not 0.0 < cutoff <= rate / (2.5 * POSITION_BAND):
         raise CalibrationError(
@@ -291,7 +292,8 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     standing_m_s = max(standing_m_s, SURE_SIGMA * speed_noise_m_s(noise_m, rate, half))
     place, speed = (savgol_filter(position, 2 * half + 1, 2, deriv=k, delta=1.0 / rate) for k in (0, 1))
     wobble_m = rms(position - smooth)
-    retreat = retreat_m(max(noise_m, wobble_m), 1e-3 * resolution_of(recording.position_mm))
+    # Rounding steps above the travel per sample are not white noise.
+    retreat = RETREAT_SIGMA * max(noise_m, wobble_m) + 1.5 * (1e-3 * resolution_of(recording.position_mm))
     way = ways(place, turning_points(place, retreat))
     standing = speed * way <= standing_m_s
     stuck, stuck_notes = stuck_samples(even.force_n, even.t_s, ~standing, recording.name)
@@ -358,11 +360,6 @@ def acceleration_over_two(position_m: Floats, rate_hz: float) -> Floats:
     found = np.zeros_like(position_m)
     found[2:-2] = (position_m[4:] - 2.0 * position_m[2:-2] + position_m[:-4]) * (0.5 * rate_hz) ** 2
     return found
-
-
-def _noise_floor(position_m: Floats, rate_hz: float) -> float:
-    frequency, power = _spectrum(position_m, rate_hz)
-    return float(np.median(power[frequency > 0.375 * rate_hz]))
 
 
 def _spectrum(position_m: Floats, rate_hz: float) -> tuple[Floats, Floats]:

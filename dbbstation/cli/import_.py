@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -104,7 +104,8 @@ def import_(
     elif remembered is not None:
         refuse_existing(remembered, force=False)
     asker = Asker()
-    found = _read(asker, files, of_mapping, noted, (plan, machine), runs, started, frozenset(trust), not_known)
+    told = _Told(runs, started, frozenset(trust), not_known)
+    found = _read(asker, files, of_mapping, (plan, machine), told, noted)
     with staged(out, found, dry=dry_run) as put:
         if not as_json:
             _show(found)
@@ -122,16 +123,21 @@ def import_(
         echo_line(f"{len(found.runs)} runs written to {out}{kept}")
 
 
+@dataclass(frozen=True)
+class _Told:
+    named: Sequence[str]
+    started: Sequence[str]
+    trusted: frozenset[str]
+    not_known: Sequence[str]
+
+
 def _read(
     asker: Asker,
     files: Sequence[Path],
     of_mapping: MappingOptions,
-    noted: SessionOptions,
     paths: tuple[Path | None, Path | None],
-    named: Sequence[str],
-    started: Sequence[str],
-    trusted: frozenset[str],
-    not_known: Sequence[str],
+    said: _Told,
+    noted: SessionOptions,
 ) -> ImportedSession:
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
@@ -143,12 +149,13 @@ def _read(
     chosen = chosen_mapping(list(tables.values()), of_mapping, asker)
     plan = paths[0] or Path(asker.text("test plan whose circles were run", "--plan"))
     machine = paths[1] or Path(asker.text("file of the machine", "--machine"))
-    noted = _with_conditions(asker, noted, not_known)
+    noted = _with_conditions(asker, noted, said.not_known)
     asker.check()
     mapping, inline, nominal = chosen(), read_inline_plan(plan), read_machine(machine)
     planned = inline.to_domain()
-    told, begun = _told(files, named, planned), _started(files, started, mapping.zone)
-    reader = Reader(_split(asker, mapping, list(tables.values())), planned, begun, trusted)
+    told = _told(files, said.named, planned)
+    started = _started(files, said.started, mapping.zone)
+    reader = Reader(_split(asker, mapping, list(tables.values())), planned, started, said.trusted)
     reader = _with_span(asker, reader, list(tables.values()))
     mapping = reader.mapping
     runs: list[ImportedRun] = []
@@ -157,9 +164,9 @@ def _read(
     reader.check()
     places = {one.run.key: one for one in runs}
     runs = [places[one.key] for one in repeats_in_order(one.run for one in runs)]
-    as_they_are = [f"taken as they are, whatever they look like: {one}" for one in sorted(trusted)]
-    centred = [] if "centre" in trusted else _asked_centres(asker, runs, planned)
-    statements = [*_statements(mapping, runs, _unknown(noted)), *as_they_are, *centred, *reader.left_out]
+    trusted = [f"taken as they are, whatever they look like: {one}" for one in sorted(said.trusted)]
+    centred = [] if "centre" in said.trusted else _asked_centres(asker, runs, planned)
+    statements = [*_statements(mapping, runs, _unknown(noted)), *trusted, *centred, *reader.left_out]
     now = datetime.now(UTC).replace(microsecond=0)
     notes = tuple(Note(now, f"imported: {text}") for text in statements)
     details = replace(noted.details(), notes=notes)

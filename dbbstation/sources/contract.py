@@ -586,11 +586,7 @@ class ErrorSource(ABC):
         logged = self.by_temperature()
         return (*(law() for law in self.further_laws), *(() if logged is None else (logged,)))
 
-    def c_form(
-        self,
-        machine: Machine,  # noqa: ARG002
-        values: Floats,  # noqa: ARG002
-    ) -> CForm | None:
+    def c_form(self, machine: Machine, values: Floats) -> CForm | None:  # noqa: ARG002
         """Return the effect as C for a kinematics inside a control; by default None.
 
         Args:

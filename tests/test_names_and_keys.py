@@ -10,13 +10,8 @@ from __future__ import annotations
 import ast
 import sys
 from collections import defaultdict
-from pathlib import Path
 
-import pytest
-
-import dbbstation
-
-PACKAGE = Path(dbbstation.__file__).parent
+from tests.parsed import PACKAGE, trees_with
 
 MOST_LOOSE_FILES = 5
 """Files that stand in no folder of the package."""
@@ -29,22 +24,18 @@ MOST_SUBSCRIPTS = 8
 """How often the command line takes a value by a key that is written out, where a typed result would have a field."""
 
 
-@pytest.fixture(scope="module")
-def trees():
-    return {path.relative_to(PACKAGE): ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
-
-
 def public_classes(trees):
     found = defaultdict(list)
-    for path, tree in trees.items():
+    for path, tree in trees:
         for node in ast.walk(tree):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                found[node.name].append(str(path))
+                found[node.name].append(path)
     return found
 
 
 def is_anonymous_dictionary(node):
-    return isinstance(node, ast.Subscript) and ast.unparse(node) == "dict[str, Any]"
+    named = isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "dict"
+    return named and ast.unparse(node) == "dict[str, Any]"
 
 
 def is_key(node):
@@ -54,38 +45,54 @@ def is_key(node):
 
 
 def count(trees, is_one, folder=""):
-    chosen = [tree for path, tree in trees.items() if path.parts[0].startswith(folder)]
-    return sum(is_one(node) for tree in chosen for node in ast.walk(tree))
+    return sum(is_one(node) for path, tree in trees if path.startswith(folder) for node in ast.walk(tree))
 
 
-def test_no_two_public_classes_have_one_name(trees):
-    assert {name: files for name, files in public_classes(trees).items() if len(files) > 1} == {}
+def shared_names():
+    return {name: files for name, files in public_classes(trees_with({"class"})).items() if len(files) > 1}
 
 
-def test_loose_files_do_not_become_more(trees):
-    assert sum(len(path.parts) == 1 for path in trees) <= MOST_LOOSE_FILES
+def anonymous_dictionaries():
+    return count(trees_with({"Any"}), is_anonymous_dictionary)
 
 
-def test_dictionaries_of_anything_do_not_become_more(trees):
-    assert count(trees, is_anonymous_dictionary) <= MOST_ANONYMOUS_DICTIONARIES
+def keys_in_the_command_line():
+    return count(trees_with(None, "cli"), is_key)
 
 
-def test_keys_in_the_command_line_do_not_become_more(trees):
-    assert count(trees, is_key, "cli") <= MOST_SUBSCRIPTS
+def loose_files():
+    return len(list(PACKAGE.glob("*.py")))
+
+
+def test_no_two_public_classes_have_one_name():
+    assert shared_names() == {}
+
+
+def test_loose_files_do_not_become_more():
+    assert loose_files() <= MOST_LOOSE_FILES
+
+
+def test_dictionaries_of_anything_do_not_become_more():
+    assert anonymous_dictionaries() <= MOST_ANONYMOUS_DICTIONARIES
+
+
+def test_keys_in_the_command_line_do_not_become_more():
+    assert keys_in_the_command_line() <= MOST_SUBSCRIPTS
 
 
 def test_counts_find_what_they_look_for():
-    tree = {Path("cli/a.py"): ast.parse("class A: ...\nclass A: ...\nx: dict[str, Any] = y['key']\n")}
+    tree = [("cli/a.py", ast.parse("class A: ...\nclass A: ...\nx: dict[str, Any] = y['key']\n"))]
     assert public_classes(tree)["A"] == ["cli/a.py", "cli/a.py"]
     assert (count(tree, is_anonymous_dictionary), count(tree, is_key, "cli"), count(tree, is_key, "nc")) == (1, 1, 0)
 
 
 def starts_the_command_line(tree):
     """Whether a process of the command line is begun: `python -m dbbstation`, `python_module("dbbstation")` or `copies("dbbstation", …)`."""
-    lists = [node.elts for node in ast.walk(tree) if isinstance(node, ast.List | ast.Tuple)]
+    nodes = list(ast.walk(tree))
+    lists = [node.elts for node in nodes if isinstance(node, ast.List | ast.Tuple)]
     calls = [
         node.args
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.Call)
         and isinstance(node.func, ast.Name)
         and node.func.id in {"python_module", "copies"}
@@ -96,17 +103,17 @@ def starts_the_command_line(tree):
     )
 
 
-def test_nobody_but_the_demonstration_starts_the_command_line(trees):
-    assert [str(path) for path, tree in trees.items() if starts_the_command_line(tree)] == ["demo/whole_job.py"]
+def test_nobody_but_the_demonstration_starts_the_command_line():
+    may = trees_with({"m", "python_module", "copies"})
+    assert [path for path, tree in may if starts_the_command_line(tree)] == ["demo/whole_job.py"]
 
 
 def counts():
-    found = {path.relative_to(PACKAGE): ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
     return {
-        "public classes with a name that another has": sum(len(one) > 1 for one in public_classes(found).values()),
-        "dict[str, Any]": count(found, is_anonymous_dictionary),
-        "subscripts by a string in cli": count(found, is_key, "cli"),
-        "files at the root of the package": sum(len(path.parts) == 1 for path in found),
+        "public classes with a name that another has": len(shared_names()),
+        "dict[str, Any]": anonymous_dictionaries(),
+        "subscripts by a string in cli": keys_in_the_command_line(),
+        "files at the root of the package": loose_files(),
     }
 
 

@@ -17,6 +17,9 @@ from tests.cli.test_help import LINES, found
 
 PACKAGE = Path(dbbstation.__file__).parent
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+(?![\w-])")
+ADVISES = re.compile(r"--[a-z]|`dbbstation ")
+"""In every text that names an option or a command."""
+
 COMMAND = re.compile(r"`dbbstation ([a-z][^`]*)`")
 
 OF_READERS = {
@@ -37,12 +40,15 @@ OTHERS |= {"--reuid", "--regid", "--clear-groups"}  # of setpriv
 
 @functools.cache  # both tests ask for the texts of all files
 def texts(path: Path) -> list[tuple[int, str]]:
-    """Texts of a file with their lines; f-strings with `X` for what is filled in; no docstrings but those of commands."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    inner = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in ast.walk(node)} - {0}
-    told = []
-    for node in ast.walk(tree):
+    """Texts of a file that advises something, with their lines; f-strings with `X` for what is filled in; no docstrings but those of commands."""
+    source = path.read_text(encoding="utf-8")
+    told: list[tuple[int, str]] = []
+    if ADVISES.search(source) is None:
+        return told
+    inner: set[int] = set()
+    for node in ast.walk(ast.parse(source)):  # an f-string before its parts
         if isinstance(node, ast.JoinedStr):
+            inner.update(map(id, ast.walk(node)))
             parts = [one.value if isinstance(one, ast.Constant) else "X" for one in node.values]
             told.append((node.lineno, "".join(map(str, parts))))
         elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in inner:

@@ -14,15 +14,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import dbbstation
 from dbbstation.files.csv_rows import csv_text
 from dbbstation.files.places import shipped_folder
 from dbbstation.text.written import on_one_line, printable
 from tests.cli.conftest import call
 from tests.fuzz.seeds import SEEDS
 from tests.fuzz.worker import place
+from tests.parsed import trees_with
 
-PACKAGE = Path(dbbstation.__file__).parent
 TITLE = "\x1b]0;owned\x07"
 FORMULA = "=HYPERLINK(1)"
 
@@ -46,30 +45,36 @@ TABLES = {
 """Files that write CSV themselves, each with its reason."""
 
 
+OF_CLICK = {"echo", "secho", "prompt", "confirm", "progressbar", "echo_via_pager", "style"}
+OF_STREAMS = {"write", "writelines", "buffer"}
+WRITE = {f"click.{name}" for name in OF_CLICK} | {
+    f"sys.{stream}.{name}" for stream in ("stdout", "stderr") for name in OF_STREAMS
+}
+
+
 def prints(tree: ast.AST) -> list[int]:
     """Lines that write to a terminal: `print`, functions of click, and the streams."""
     found = []
     for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute) and ast.unparse(node) in {
-            *(
-                f"click.{name}"
-                for name in ("echo", "secho", "prompt", "confirm", "progressbar", "echo_via_pager", "style")
-            ),
-            *(f"sys.{stream}.{name}" for stream in ("stdout", "stderr") for name in ("write", "writelines", "buffer")),
-        }:
+        if isinstance(node, ast.Attribute) and node.attr in OF_CLICK | OF_STREAMS and ast.unparse(node) in WRITE:
             found.append(node.lineno)
         if isinstance(node, ast.Name) and node.id == "print":
             found.append(node.lineno)
     return sorted(found)
 
 
+OF_TABLES = {"writer", "DictWriter", "savetxt"}
+
+
 def writes_tables(tree: ast.AST) -> list[int]:
     """Lines that write CSV: its module, NumPy's function, and cells joined by a separator."""
     found = []
     for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute) and ast.unparse(node) in {"csv.writer", "csv.DictWriter", "np.savetxt"}:
+        if not isinstance(node, ast.Attribute):
+            continue
+        if node.attr in OF_TABLES and ast.unparse(node) in {"csv.writer", "csv.DictWriter", "np.savetxt"}:
             found.append(node.lineno)
-        if isinstance(node, ast.Call) and ast.unparse(node.func) in {"','.join", "';'.join", r"'\t'.join"}:
+        if node.attr == "join" and ast.unparse(node.value) in {"','", "';'", r"'\t'"}:
             found.append(node.lineno)
     return sorted(found)
 
@@ -78,11 +83,10 @@ def writes_tables(tree: ast.AST) -> list[int]:
 def found_in_package() -> dict[str, dict[str, list[int]]]:
     """Lines of each file by the search that found them; each file is parsed once."""
     found: dict[str, dict[str, list[int]]] = {search.__name__: {} for search in (prints, writes_tables)}
-    for path in PACKAGE.rglob("*.py"):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+    for name, tree in trees_with({"print", "join"} | OF_CLICK | OF_STREAMS | OF_TABLES):
         for search in (prints, writes_tables):
             if lines := search(tree):
-                found[search.__name__][path.relative_to(PACKAGE).as_posix()] = lines
+                found[search.__name__][name] = lines
     return found
 
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import ast
 import importlib
-from pathlib import Path
 
-import dbbstation
+from tests.parsed import trees_with
 from tests.system.windows.sitecustomize import declared
 
-PACKAGE = Path(dbbstation.__file__).parent
 MODULES = ("os", "select", "signal", "subprocess", "time")
 
 
@@ -36,8 +34,8 @@ def test_no_other_folder_uses_names_that_windows_lacks():
     assert "os.replace" not in names
     assert names_used(ast.parse("os.pread(h, 1, 2)"), names) == [(1, "os.pread")]
     found = {
-        path.relative_to(PACKAGE).as_posix(): used
-        for path in PACKAGE.rglob("*.py")
-        if path.parent.name != "system" and (used := names_used(ast.parse(path.read_text(encoding="utf-8")), names))
+        path: used
+        for path, tree in trees_with({name.partition(".")[2] for name in names})
+        if not path.startswith("system/") and (used := names_used(tree, names))
     }
     assert found == {}

@@ -131,7 +131,9 @@ _COMPILING = threading.RLock()
 
 def in_blocks(kernel: Callable[..., None], count: int, *arguments: Any) -> None:  # noqa: ANN401 - those of the kernel
     """Call `kernel(start, stop, *arguments)` for blocks of `range(count)`, on all cores if worthwhile."""
-    workers = min(os.cpu_count() or 1, count // SMALLEST_BLOCK)
+    workers = count // SMALLEST_BLOCK
+    if workers > 1:  # asking for the cores takes as long as a short loop
+        workers = min(workers, os.cpu_count() or 1)
     if workers <= 1 or _is_worker():
         kernel(0, count, *arguments)
         return

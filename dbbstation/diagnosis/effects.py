@@ -17,7 +17,7 @@ from dbbstation.facts.serialise import Array, AsItIs, Kept
 from dbbstation.facts.value import finite
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.machine.kinematics import position_responses
-from dbbstation.machine.travel import is_within_travel
+from dbbstation.machine.travel import reachable
 from dbbstation.model.identified import known_u, position_uncertainty_mm, rms_length
 from dbbstation.model.machine_model import by_parameters
 from dbbstation.sources.contract import Motion, Need, Owner
@@ -104,7 +104,7 @@ def workspace(machine: Machine) -> Floats:
     tilts = np.array(TILTS_DEG)[tilt.ravel()]
     poses = np.column_stack([x.ravel(), y.ravel(), z.ravel(), tilts, np.zeros(len(tilts))])
     inside = np.hypot(poses[:, 0], poses[:, 1]) <= REACH * travel.xy_radius_mm + 1e-9
-    return poses[[row for row in np.flatnonzero(inside) if is_within_travel(machine, poses[row : row + 1])]]
+    return reachable(machine, poses[inside])
 
 
 GEOMETRY = "geometry"

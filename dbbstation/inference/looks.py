@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebpts1, chebvander
 from scipy.fft import rfft
 from scipy.sparse import csr_array
 
@@ -88,7 +89,7 @@ class Sums:
         base = (flat @ self.base.reshape(pieces, -1)).reshape(many, count, *self.base.shape[1:])
         pairs = (curves[:, :, :, None] * curves[:, :, None, :]).reshape(pieces, -1)
         gains = (pairs.T @ self.gains.reshape(pieces, -1)).reshape(many, count, count, *self.gains.shape[1:])
-        return solved(rest, taken(base), gains)
+        return solved(rest, paired(gains) - taken(base))
 
     def of_forms(self, forms: Sequence[Form]) -> Floats:
         """Return squares explained by forms, shape (m,)."""
@@ -109,7 +110,8 @@ class Sums:
             some = self.base[:, :, column : column + BOUNDS.sums_at_once].reshape(pieces, -1)
             of_base += taken(sides(transformed(some, 1).reshape(last - first, directions, -1)))
         twice = transformed(self.gains.reshape(pieces, -1), 2).reshape(last - first, directions, directions)
-        return solved(sides(transformed(self.rest, 1)), of_base, squares(self.gains.sum(axis=0), twice))
+        gains = squares(self.gains.sum(axis=0), twice)
+        return solved(sides(transformed(self.rest, 1)), paired(gains) - of_base)
 
     def best(self, forms: Sequence[Form], most: int) -> list[tuple[float, Form]]:
         """Return the locally best forms of a list with explained squares, best first."""
@@ -119,24 +121,47 @@ class Sums:
     def finer(self, frequencies: Iterable[float], extent: float) -> list[tuple[float, Wave]]:
         """Optimise waves near given frequencies; return waves with explained squares, best first.
 
+        Waves near a frequency are this wave times a slow one, which is interpolated between few points. Only the
+        interpolating polynomials need sums over bins.
+
         Args:
             extent: of the variable.
         """
+        middle, half = 0.5 * (self.at.max() + self.at.min()), 0.5 * float(np.ptp(self.at))
+        points = chebpts1(POINTS_OF_SLOW)
+        between = chebvander((self.at - middle) / half, len(points) - 1) @ np.linalg.inv(
+            chebvander(points, len(points) - 1)
+        )
         found = []
-        for best in frequencies:
+        for first in frequencies:
+            phase = 2.0 * np.pi * first * (self.at - middle)[:, None]
+            rest, normal = self._sums_of(np.hstack([np.cos(phase) * between, np.sin(phase) * between]))
+            best = first
             for step in FINER:
                 near = best + np.arange(-15, 16) * step / extent
                 near = near[near > 0.25 / extent]
-                phase = 2.0 * np.pi * near * self.at[:, None]
-                explained = self.explained(np.stack([np.cos(phase), np.sin(phase)], axis=-1))
-                best = float(near[int(explained.argmax())])  # noqa: PLW2901 - improved twice
+                slow = 2.0 * np.pi * (near - first)[:, None] * half * points
+                cosine, sine = np.cos(slow), np.sin(slow)
+                waves = np.stack([np.hstack([cosine, -sine]), np.hstack([sine, cosine])], axis=1)
+                along_first = np.tensordot(waves, normal, axes=1)
+                explained = solved(waves @ rest, np.einsum("mpdje,mqj->mpdqe", along_first, waves))
+                best = float(near[int(explained.argmax())])
             found.append((float(explained.max()), Wave(best)))
         return sorted(found, key=lambda one: -one[0])
+
+    def _sums_of(self, curves: Floats) -> tuple[Floats, Floats]:
+        """Return sums for curves, shape (b, i): of rest, (i, d), and of pairs less the base's part, (i, d, i, d)."""
+        base = np.tensordot(curves, self.base, axes=(0, 0))
+        gains = np.tensordot(curves[:, :, None, None] * self.gains[:, None], curves, axes=(0, 0))
+        return curves.T @ self.rest, gains.transpose(0, 1, 3, 2) - np.tensordot(base, base, axes=(2, 2))
 
 
 FINER = (1.0 / 30.0, 1.0 / 450.0)
 """Successive frequency steps, in units of one over the extent; the last gives the phase within a degree over the
 extent."""
+
+POINTS_OF_SLOW = 16
+"""Points that interpolate a wave of half a period over the extent to 1e-14 [Chebyshev points of the first kind]."""
 
 
 def peaks(explained: Floats, most: int) -> Integers:
@@ -177,12 +202,17 @@ def taken(base: Floats) -> Floats:
     return side @ side.transpose(0, 2, 1)
 
 
-def solved(rest: Floats, of_base: Floats, gains: Floats) -> Floats:
-    """Return squares explained by columns, from residual sums (m, p, d), `taken` and products (m, p, p, d, d)."""
+def paired(gains: Floats) -> Floats:
+    """Return products of curves as matrices, shape (m, p d, p d), from shape (m, p, p, d, d)."""
+    size = gains.shape[1] * gains.shape[3]
+    return gains.transpose(0, 1, 3, 2, 4).reshape(len(gains), size, size)
+
+
+def solved(rest: Floats, normal: Floats) -> Floats:
+    """Return squares explained by columns, from residual sums (m, p, d), and products less `taken`, (m, p d, p d) or (m, p, d, p, d)."""
     many, size = len(rest), rest.shape[1] * rest.shape[2]
-    normal = gains.transpose(0, 1, 3, 2, 4).reshape(many, size, size) - of_base + np.eye(size)
     right = rest.reshape(many, size, 1)
-    return (right * np.linalg.solve(normal, right)).sum(axis=(1, 2))
+    return (right * np.linalg.solve(normal.reshape(many, size, size) + np.eye(size), right)).sum(axis=(1, 2))
 
 
 PLACED = (Family.WAVE, Family.BUMP, Family.STEP)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.compiled import compiled, inlined
-from dbbstation.errors import MachineError, TravelError
+from dbbstation.errors import TravelError
 from dbbstation.machine.geometry import STRUTS, Frames, rotation_matrices
 from dbbstation.machine.kinematics import inverse, strut_jacobian
 
@@ -31,11 +31,17 @@ SMALLER = "move the circle, make it smaller or tilt it less"
 
 def is_within_travel(machine: Machine, poses: Floats) -> bool:
     """Return whether all poses, shape (n, 6) [mm, deg], are reachable."""
-    try:
-        check_travel(machine, poses, where="")
-    except MachineError:
-        return False
-    return True
+    return first_outside(machine, poses)[0] == len(poses)
+
+
+def reachable(machine: Machine, poses: Floats) -> Floats:
+    """Return the reachable ones of poses, shape (n, 6) [mm, deg]."""
+    found, rest = [poses[:0]], poses
+    while len(rest):
+        number, _ = first_outside(machine, rest)
+        found.append(rest[:number])
+        rest = rest[number + 1 :]
+    return np.vstack(found)
 
 
 def check_travel(machine: Machine, poses: Floats, *, where: str, remedy: str = SMALLER) -> None:

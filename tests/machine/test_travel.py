@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import TravelError
-from dbbstation.machine.travel import check_travel, middle
+from dbbstation.machine.travel import check_travel, is_within_travel, middle, reachable
 
 HOME = np.array([[0.0, 0.0, -1008.0, 0.0, 0.0, 0.0]])
 
@@ -25,6 +25,15 @@ def test_the_middle_lies_on_the_axis_half_way_and_untilted(reference):
     low, high = reference.travel.z_mm
     np.testing.assert_allclose(frames.position_mm, [[0.0, 0.0, (low + high) / 2.0]])
     np.testing.assert_allclose(frames.rotation, np.eye(3)[None], atol=1e-15)
+
+
+@pytest.mark.parametrize("outside", [[], [0], [2, 3], [1, 4], [0, 1, 2, 3, 4]])
+def test_poses_outside_are_left_out_wherever_they_stand(reference, outside):
+    poses = np.vstack([pose(x=float(x)) for x in range(5)])
+    poses[outside, 2] = 0.0
+    inside = [each for each in poses if is_within_travel(reference, each[None])]
+    assert len(inside) == 5 - len(outside)
+    np.testing.assert_array_equal(reachable(reference, poses), np.reshape(inside, (-1, 6)))
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ from dbbstation.files.places import shipped_folder
 from dbbstation.files.yaml import text
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.machine.geometry import Machine
-from tests.copied import kept_loaded
+from tests import copied
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -99,8 +99,13 @@ def reference() -> Machine:
 @pytest.fixture(scope="session")
 def copies() -> Iterator[None]:
     """The process that `tests.copied` copies stands before a test begins, and is none of what the test leaves open."""
-    with kept_loaded():
+    with copied.kept_loaded():
         yield
+
+
+@pytest.fixture
+def copied_works(copies: None, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: ARG001
+    copied.copied_works(monkeypatch)
 
 
 @pytest.fixture(scope="module")

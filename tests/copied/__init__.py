@@ -11,6 +11,7 @@ import subprocess
 import sys
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import patch
 
 from dbbstation.system.copies import copied_process
@@ -21,13 +22,14 @@ _kept = [None]
 
 
 class Copy(subprocess.Popen):
-    """`subprocess.Popen` of the words of a command behind `python -m dbbstation`."""
+    """`subprocess.Popen` of a module of the program and its words, or of Python that runs it by `-m`."""
 
     def _execute_child(self, args, executable, preexec_fn, close_fds, pass_fds, cwd, env, *more):  # noqa: ARG002
         inputs = more[3:9]  # behind startupinfo, creationflags and shell: each pipe's end of the child, and ours
         streams = [own if own >= 0 else number for number, own in enumerate((inputs[0], inputs[3], inputs[5]))]
         self._copied = _kept[-1]
-        words = [json.dumps(dict(env or os.environ)), "alone" if more[14] else "", *map(str, args)]
+        module = args[args.index("-m") + 1 :] if args[0] == sys.executable else args
+        words = [json.dumps(dict(env or os.environ)), "alone" if more[14] else "", *map(str, module)]
         self.pid = self._copied.begin(words, cwd or Path.cwd(), streams)
         self._child_created = True
         self._close_pipe_fds(*inputs)
@@ -50,7 +52,7 @@ def started(words, **named) -> subprocess.Popen:
     return (
         subprocess.Popen([sys.executable, "-m", "dbbstation", *map(str, words)], **named)
         if _kept[-1] is None
-        else Copy(words, **named)
+        else Copy(["dbbstation", *words], **named)
     )
 
 
@@ -64,6 +66,15 @@ def done(words, *, typed="", timeout=120.0, **named) -> subprocess.CompletedProc
             process.kill()
             raise
     return subprocess.CompletedProcess(words, process.returncode, out, said)
+
+
+_WITH_COPIES = SimpleNamespace(Popen=Copy, PIPE=subprocess.PIPE, TimeoutExpired=subprocess.TimeoutExpired)
+
+
+def copied_works(patch):
+    """Let the works of the screen be copies, too."""
+    if _kept[-1] is not None:
+        patch.setattr("dbbstation.service.work.subprocess", _WITH_COPIES)
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Makes a copy of the loaded process `python -m dbbstation WORDS`, with the environment and the terminal of the test."""
+"""Makes a copy of the loaded process `python -m MODULE WORDS`, with the environment and the terminal of the test."""
 
 import json
 import os
@@ -7,7 +7,7 @@ import signal
 import sys
 
 if __name__ == "__main__":
-    environment, alone, *sys.argv[1:] = sys.argv[1:]
+    environment, alone, module, *sys.argv[1:] = sys.argv[1:]
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.environ.clear()
     os.environ.update(json.loads(environment))
@@ -19,4 +19,4 @@ if __name__ == "__main__":
     sys.stderr = sys.__stderr__ = open(  # noqa: SIM115
         2, "w", buffering=1, encoding="utf-8", errors="backslashreplace", closefd=False
     )
-    runpy.run_module("dbbstation", run_name="__main__", alter_sys=True)
+    runpy.run_module(module, run_name="__main__", alter_sys=True)

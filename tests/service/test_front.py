@@ -333,6 +333,7 @@ def test_virtual_ports_are_offered(front: Front) -> None:
     assert front.probe(Line(instrument="streaming-encoder", port=next(iter(VIRTUAL)))).answers
 
 
+@pytest.mark.usefixtures("copied_works")
 def test_programs_are_written_beside_the_session_and_commanded_by(front: Front) -> None:
     front.under.mkdir()
     choice = front.virtual_choice()

@@ -393,6 +393,7 @@ def test_an_operator_in_trouble_reads_the_shops_own_text_and_no_command() -> Non
     assert "`dbbstation instrument ports`" in sentence_now(board)
 
 
+@pytest.mark.usefixtures("copied_works")
 def test_a_jobs_report_has_the_shops_letterhead_and_the_jobs_tolerances(job_file: Path) -> None:
     folder = job_file.parent
     session = shutil.copytree(FIXTURES / "sessions" / "virtual", folder / "monday-2026-11-20")

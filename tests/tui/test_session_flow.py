@@ -47,6 +47,8 @@ if TYPE_CHECKING:
 
     Play = Callable[[Pilot[None], StationApp], Awaitable[None]]
 
+pytestmark = pytest.mark.usefixtures("copied_works")
+
 PATIENCE_S = 60.0
 
 

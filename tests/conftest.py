@@ -110,10 +110,14 @@ def copied_works(copies: None, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa
 
 @pytest.fixture(scope="module")
 def few_parts(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Hold out four parts, the fewest that are judged, instead of ten, and draw tests four times instead of twenty; not in nightly tests."""
+    """Hold out four parts, the fewest that are judged, instead of ten, draw tests four times instead of twenty, refine two waves instead
+    of six and propose no tests, which these tests do not look at; not in nightly tests.
+    """
     with pytest.MonkeyPatch.context() as patch:
         if "not nightly" in request.config.option.markexpr:
             patch.setattr("dbbstation.inference.folds.BOUNDS", replace(BOUNDS, folds=4, selection_draws=4))
+            patch.setattr("dbbstation.diagnosis.unmodelled.BOUNDS", replace(BOUNDS, made_finer=2))
+            patch.setattr("dbbstation.diagnosis.diagnose.next_tests", lambda *_: ())
         yield
 
 

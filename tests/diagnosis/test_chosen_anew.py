@@ -44,6 +44,7 @@ FEW = ("jig-bump", "bar-scale", "bar-drift", "backlash", "gravity", "platform-jo
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_parts")
 @pytest.mark.parametrize(
     ("candidates", "tests", "bumped", "rate_hz"),
     [(FEW, EIGHT, 9, 3.0), pytest.param(None, ALL, 15, 10.0, marks=pytest.mark.nightly)],

@@ -23,6 +23,8 @@ from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 FEW = ("backlash", "gravity", "strut-weight", "screw-cyclic", "bar-drift", "jig-bump")
 STRUT_3_UM = 12.0
 

@@ -18,6 +18,8 @@ from tests.plant.mechanisms.warming import Warming
 from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
+pytestmark = pytest.mark.usefixtures("few_parts")
+
 NAMES = ("gravity", "thermal-frame", "thermal-struts", "bar-drift")
 
 

@@ -89,7 +89,7 @@ def test_nothing_is_left_is_not_said_of_a_strut_that_rings(tmp_path):
 @pytest.mark.parametrize(
     ("law", "name", "tests", "rate_hz"),
     [
-        (RINGS, None, EIGHT, 10.0),
+        (RINGS, None, EIGHT, 6.0),
         pytest.param(RINGS, None, ALL, 20.0, marks=pytest.mark.nightly),
         # That it settles with its length in its range is in CI: tests/diagnosis/test_at_limit.py.
         pytest.param(WINDS_UP, "backlash", ALL, 20.0, marks=pytest.mark.nightly),
@@ -117,7 +117,7 @@ def test_a_bump_between_tests_that_balls_hide_is_not_ruled_out(tmp_path):
         seed=1510,
         plan=subset(table_ii_plan(1510), EIGHT),
         mechanisms=[KINEMATICS, BumpedJig(from_run=8)],
-        rate_hz=10.0,
+        rate_hz=3.0,
     )
     summary = diagnose_sessions([tmp_path / "s"], ["jig-bump"], (), lambda _: None).summary()
     (bump,) = summary["sources"]

@@ -179,7 +179,9 @@ def test_a_warm_up_with_a_law_of_its_own_lends_no_second_name(tmp_path):
 def test_silent_when_clean_under_correlated_noise(tmp_path):
     noise = Noise(white_um=0.3, correlated_um=0.3, correlation=0.9)
     plan = subset(table_ii_plan(33), EIGHT)
-    record(tmp_path / "s", seed=33, plan=plan, mechanisms=[KINEMATICS], rate_hz=25.0, noise=noise, angles=True)
+    record(
+        tmp_path / "s", seed=33, plan=plan, mechanisms=[KINEMATICS], rate_hz=MEANS_OF_TWO_HZ, noise=noise, angles=True
+    )
     recorded = load_sessions([tmp_path / "s"])
     diagnosis = diagnose(recorded.machine, recorded.observations, sources_named(NAMES))
     assert not diagnosis.mismatch

@@ -124,7 +124,7 @@ def test_a_strut_that_became_longer_is_told(reference):
 
 
 def test_the_bar_is_told(reference):
-    shop = Workshop(2)
+    shop = Workshop(2, tests="abgl")
     found = compare(reference, shop.session("A"), shop.session("B", lambda *_: 0.005))
     assert found.differ
     best = the_cause(found, Verdict.HAPPENED)
@@ -157,12 +157,12 @@ def test_one_curve_in_all_tests_is_the_set_ups_and_one_of_a_strut_is_not(referen
 
 
 def test_a_constant_within_what_is_stated_of_the_bars_is_no_difference(reference):
-    shop = Workshop(3)
+    shop = Workshop(3, tests="abgl")
     assert not compare(reference, shop.session("A"), shop.session("B", lambda *_: 0.001)).differ
 
 
 def test_one_ball_that_sits_badly_is_found_in_its_two_runs(reference):
-    shop = Workshop(4)
+    shop = Workshop(4, tests="abdgl")
 
     def shifted(circle, theta_deg, _):
         return -0.02 * np.cos(np.radians(theta_deg)) * (circle.ball_mm == PLAN.tests["d"].ball.centre_mm)
@@ -198,7 +198,7 @@ def test_a_jig_that_was_put_down_elsewhere_is_one_body(reference):
 
 
 def test_a_drift_is_told_from_a_constant(reference):
-    shop = Workshop(6)
+    shop = Workshop(6, tests="abgl")
     found = compare(reference, shop.session("A"), shop.session("B", lambda _c, _t, started: 1e-6 * started))
     assert found.there[0].name in {"bar-drift", "drift with time in B", "curve over time in B", "offset by block"}
     assert found.there[0].verdict is Verdict.HAPPENED
@@ -207,7 +207,7 @@ def test_a_drift_is_told_from_a_constant(reference):
 
 @pytest.mark.slow
 def test_what_changes_its_sign_with_the_direction(reference):
-    shop = Workshop(8)
+    shop = Workshop(8, tests="abgl")
 
     def reversal(circle, theta_deg, _):
         return circle.direction.sign * 0.001 * np.sign(np.sin(np.radians(theta_deg)))
@@ -222,7 +222,7 @@ def test_what_changes_its_sign_with_the_direction(reference):
 
 
 def test_a_difference_without_order_is_called_that(reference):
-    shop = Workshop(9)
+    shop = Workshop(9, tests="abgl")
     own = {test.ball.centre_mm: shop.rng.normal(0, 0.002, 6) for test in PLAN.tests.values()}
 
     def change(circle, theta_deg, _):
@@ -241,7 +241,7 @@ def test_a_difference_without_order_is_called_that(reference):
 
 def test_other_samplings_and_starts_are_no_difference(reference):
     """Centres 20 µm off: a quarter of a degree is 0.1 µm, which would show."""
-    shop = Workshop(10)
+    shop = Workshop(10, tests="abgl")
     a = shop.session("A")
     shop.samples, shop.start_deg = 1300, 90.0
     assert not compare(reference, a, shop.session("B")).differ

@@ -100,7 +100,7 @@ def in_sigma(curve, true_um, order):
 
 def roundness_um(truth, model, centre_mm, tilt_deg):
     """Circularity of a circle that is compensated with a model, on the true machine."""
-    theta = np.radians(np.arange(0, 360, 1.0))
+    theta = np.radians(np.arange(0, 360, 4.0))
     poses = np.zeros((len(theta), 6))
     poses[:, :3] = np.array(centre_mm) + 150 * np.column_stack([np.cos(theta), np.sin(theta), np.zeros_like(theta)])
     poses[:, 3:5] = tilt_deg

@@ -13,9 +13,9 @@ NOISE_MM = 0.02
 
 
 def test_a_slow_effect_four_times_the_noise_is_found():
-    """The product of place and load, twenty rows late: as noise it would have some 15 independent samples in 409 rows."""
+    """The product of place and load, twenty rows late: as noise it would have some ten independent samples in 250 rows."""
     rng = np.random.default_rng([77, 2])
-    rows = int(rng.integers(300, 700))
+    rows = 250
     axis = moving(rng, rows)
     missing = lfilter([0.05], [1.0, -0.95], axis.place * axis.load)
     missing = 4.0 * NOISE_MM * (missing - missing.mean()) / missing.std()

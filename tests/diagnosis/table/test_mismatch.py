@@ -100,7 +100,7 @@ def test_a_form_is_found_by_its_name_with_its_size(tmp_path, name):
 
 def test_what_is_measured_late_has_a_delay_that_is_positive(rng):
     """The same function of time, 30 ms later."""
-    seconds = np.arange(1000) * 0.02
+    seconds = np.arange(500) * 0.02
 
     def value(at):
         return np.sin(at) + 0.4 * np.cos(2.7 * at + 1.0)

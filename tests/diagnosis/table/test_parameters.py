@@ -14,7 +14,7 @@ from dbbstation.inference.levels import Verdict
 from dbbstation.results.mismatch import mismatch_result
 from dbbstation.tasks.tables import TableOptions, load_tables, stated_uncertainties
 
-ROWS, NOISE_MM, LINE_MM, STIFFNESS_OFF = 400, 0.01, 0.06, 0.02
+ROWS, NOISE_MM, LINE_MM, STIFFNESS_OFF = 300, 0.01, 0.06, 0.02
 
 
 @pytest.fixture

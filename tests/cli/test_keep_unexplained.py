@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.cli import FAILED
 from tests.plant.mechanisms.outsiders import OddGearWobble
-from tests.plant.plan import EIGHT, subset, table_ii_plan
+from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
 
 
@@ -18,10 +18,10 @@ def kept(tmp_path_factory, run):
     """A session with a wave of 66.7 mm in strut 3, what was printed, the model that keeps it, and the true machine."""
     folder = tmp_path_factory.mktemp("kept")
     wobble = OddGearWobble(strut=3, turns_per_screw_turn=0.15, amplitude_um=6.0)
-    plan = subset(table_ii_plan(51), EIGHT)
+    plan = subset(table_ii_plan(51), "abdhjk")
     truth = record(folder / "session", seed=51, plan=plan, mechanisms=[wobble], rate_hz=10.0)
     model = folder / "kept.yaml"
-    line = ("diagnose", folder / "session", "--sources", "backlash", "--out", model)
+    line = ("diagnose", folder / "session", "--sources", "backlash", "--no-held-out", "--out", model)
     outcome = run(*line)
     assert outcome.code == 0, outcome.err
     return outcome, model, truth

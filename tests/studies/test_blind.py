@@ -285,7 +285,7 @@ def study(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("blind")
     answers = []
     for name, hidden in (("0001", []), ("0002", [Gravity()])):
-        plan = subset(table_ii_plan(int(name)), "abhimo")
+        plan = subset(table_ii_plan(int(name)), "abho")
         truth = record(
             folder / name, plan=plan, seed=int(name), mechanisms=[RandomKinematics(), *hidden], rate_hz=request.param
         )

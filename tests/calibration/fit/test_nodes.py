@@ -15,14 +15,14 @@ from dbbstation.sources.contract import Effect, LinearSource, Need, Owner, Param
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics
-from tests.plant.plan import EIGHT, elevated, subset, table_ii_plan
+from tests.plant.plan import elevated, subset, table_ii_plan
 from tests.plant.session import record
 
 ERRORS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.1)
 USUAL = ("strut-reference-length", "base-joints", "mounting", "ball-coordinate", "bar-offset")
 
 
-@pytest.fixture(scope="module", params=[EIGHT, pytest.param("abcdefghijklmno", marks=pytest.mark.nightly)])
+@pytest.fixture(scope="module", params=["abhk", pytest.param("abcdefghijklmno", marks=pytest.mark.nightly)])
 def long_runs(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("plant") / "long"
     record(

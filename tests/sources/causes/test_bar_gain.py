@@ -56,7 +56,7 @@ def read(folder, *mechanisms):
 @pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [4.0, pytest.param(10.0, marks=pytest.mark.nightly)])
 def test_circles_of_two_sizes_find_it_and_circles_of_one_say_that_they_cannot(tmp_path, rate_hz):
-    plan = subset(table_ii_plan(1), "abdfhjkn")
+    plan = subset(table_ii_plan(1), "abfhkn")
     smaller = Path(radius_mm=147.0)
     two = replace(plan, tests=tuple(replace(t, path=smaller) if k % 2 else t for k, t in enumerate(plan.tests)))
     scale = BarScale(linear_um=0.3, curved_um=0.0, set_at_mm=150.0)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
+    from scipy.sparse import csr_array
 
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.machine.geometry import Compliance, Hexapod, Machine
@@ -288,17 +289,18 @@ class FinerMotion:
 
     def means(self, samples: Floats) -> Floats:
         """Return each row's mean of samples, shape (m, ...)."""
-        order, first, count = self._by_row
-        if order is not None:
-            samples = samples[order]
-        return np.add.reduceat(samples, first, axis=0) / count.reshape(-1, *[1] * (samples.ndim - 1))
+        sums, count = self._by_row
+        found = (sums @ samples.reshape(len(samples), -1)) / count[:, None]
+        return np.asarray(found.reshape(-1, *samples.shape[1:]), dtype=np.float64)
 
     @cached_property
-    def _by_row(self) -> tuple[Integers | None, Integers, Integers]:
-        """Return the samples' order by row (None if they are in order), each row's first place and its number of samples."""
+    def _by_row(self) -> tuple[csr_array, Integers]:
+        """Return the matrix that adds each row's samples, shape (n, m), and their numbers, shape (n,)."""
+        from scipy.sparse import csr_array  # noqa: PLC0415 - commands that fit nothing need not load it
+
         count = np.bincount(self.row)
-        order = np.argsort(self.row, kind="stable") if np.any(np.diff(self.row) < 0) else None
-        return order, np.cumsum(count) - count, count
+        order, ends = np.argsort(self.row, kind="stable"), np.cumsum([0, *count])
+        return csr_array((np.ones(len(order)), order, ends), shape=(len(count), len(order))), count
 
 
 def of_each_strut(
@@ -325,8 +327,10 @@ def of_each_joint(
 
 def of_own_strut(along: Floats) -> Floats:
     """Return changes of the struts by each strut's own p amplitudes, shape (n, 6, 6 p), from those along each, shape (n, 6, p) or (n, 6)."""
-    own = np.atleast_3d(along)[:, :, None, :] * np.eye(STRUTS)[:, :, None]
-    return own.reshape(*along.shape[:2], STRUTS * own.shape[3])
+    own = np.atleast_3d(along)
+    found = np.zeros((len(own), STRUTS, STRUTS, own.shape[2]))
+    found[:, np.arange(STRUTS), np.arange(STRUTS)] = own
+    return found.reshape(len(own), STRUTS, -1)
 
 
 @dataclass(frozen=True)

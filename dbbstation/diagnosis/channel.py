@@ -11,20 +11,9 @@ import numpy as np
 
 from dbbstation.calibration.checks.scatter import LEAST_STATED_MM, misfit_of
 from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_MM
-from dbbstation.diagnosis.parts import (
-    Effects,
-    amplitudes,
-    by_amplitudes,
-    by_terms,
-    discrepancy_of,
-    forms_of,
-    has_common,
-    is_shape,
-    left_open_of,
-    seen_of,
-)
+from dbbstation.diagnosis.parts import SourceOverRuns, by_terms, is_shape, seen_of
 from dbbstation.diagnosis.shapes import variables
-from dbbstation.inference.bank import spacing_of
+from dbbstation.inference.bank import parts_of, spacing_of
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.harmonics import noise_left_by
@@ -79,9 +68,8 @@ class CircleChannel:
         self.columns = CauseColumns(base, room=BOUNDS.room)
         self.sources = {(source.name, source.law): source for source in sources}
         self.set_up = self._outsize()
-        self._laid: dict[tuple[str, str], tuple[Variant, ...]] = {}
-        for key, source in self.sources.items():
-            self._laid[key] = self._on_a_grid(source)
+        self.over = {key: self._over(source) for key, source in self.sources.items()}
+        self._laid = {key: self._on_a_grid(over) for key, over in self.over.items()}
         self._refined: dict[tuple[str, str], tuple[Variant, ...]] = {}
         self._refined_anew: set[tuple[str, str]] = set()
         self._former: list[Variant] = []
@@ -124,7 +112,7 @@ class CircleChannel:
         """Return a cause's form with all amplitudes at the same nonlinear parameters, without slack."""
         if not len(variant.whole):
             return replace(variant, slack=variant.slack[:0], slack_sd=variant.slack_sd[:0])
-        sizes = [p.plausible for p in amplitudes(self.source_of(name, variant), self.machine)]
+        sizes = [p.plausible for p in self.over[name, variant.law].amplitudes]
         plausible = np.tile(sizes, len(variant.whole) // len(sizes))
         return Variant(variant.whole, plausible, variant.nonlinear, law=variant.law)
 
@@ -206,41 +194,28 @@ class CircleChannel:
 
     def refine(self, name: str, law: str, values: Mapping[str, Floats], fit: Calibration) -> None:
         """Add columns of a cause at parameter values, with tangents and slack."""
-        source, replaced = self.sources[name, law], self._refined.pop((name, law), ())
+        over, replaced = self.over[name, law], self._refined.pop((name, law), ())
         if (name, law) in self._refined_anew:
             self._free(replaced)  # no comparison has used them
         else:
             self._former += replaced
         self._refined_anew.add((name, law))
-        readings = self._readings_about(fit)
-        parameters = source.parameters(self.machine)
-        shaped, shapes = is_shape(source, self.machine), [p for p in parameters if p.grid]
-        shared = [source.shared_by(motion) for motion in self.motions]
-        derivatives = [
-            reading.by_source(source, self.machine, values[own]) for reading, own in zip(readings, shared, strict=True)
-        ]
+        over = replace(over, readings=self._readings_about(fit))
+        shaped, uncertain = is_shape(over.source, self.machine), over.source.form_uncertainty
+        effects = over.effects(values[own] for own in over.shared)
         point = tuple(next(iter(values.values()))[shaped].tolist())
-        variants = self._variants(source, [d[:, ~shaped] for d in derivatives], shared, point)
-        tangents = np.vstack([d[:, shaped] for d in derivatives])
-        tangent_sd = np.array([_spacing(p, value) for p, value in zip(shapes, point, strict=True)])
-        effects = [
-            Effects(motion, reading, values[own], derivative, known)
-            for motion, reading, own, derivative, known in zip(
-                self.motions, readings, shared, derivatives, self.variables, strict=True
-            )
-        ]
-        least_mm = LEAST_SLACK * max(self.first_noise_mm, SMALLEST_NOISE_MM) / MOST_SLACK
-        discrepancy, parts = (
-            seen_of(of(source, self.machine, effects), source.form_uncertainty, least_mm)
-            for of in (discrepancy_of, left_open_of)
-        )
-        slack = self.columns.add(np.hstack([tangents, discrepancy, parts]))
-        sd = np.concatenate([tangent_sd, np.full(discrepancy.shape[1] + parts.shape[1], source.form_uncertainty)])
-        plausible = np.array([p.plausible for p in parameters])[~shaped]
-        at = max(rms(np.array([own[~shaped] / plausible for own in values.values()])), 1e-12)
         # A tangent covers about 2.5 grid points of a nonlinear parameter.
-        covered = [len(p.grid) / (1.0 if p.listed else 2.5) for p in shapes]
+        covered = [len(p.grid) / (1.0 if p.listed else 2.5) for p in over.shapes]
         weight = -float(np.log(max(float(np.prod(covered)), 1.0)))
+        variants = self._variants(over, over.by_group(one.derivative[:, ~shaped] for one in effects), point, weight)
+        tangents = np.vstack([one.derivative[:, shaped] for one in effects])
+        tangent_sd = np.array([_spacing(p, value) for p, value in zip(over.shapes, point, strict=True)])
+        least_mm = LEAST_SLACK * max(self.first_noise_mm, SMALLEST_NOISE_MM) / MOST_SLACK
+        discrepancy, parts = (seen_of(columns, uncertain, least_mm) for columns in over.slack(effects))
+        slack = self.columns.add(np.hstack([tangents, discrepancy, parts]))
+        sd = np.concatenate([tangent_sd, np.full(discrepancy.shape[1] + parts.shape[1], uncertain)])
+        plausible = np.array([p.plausible for p in over.amplitudes])
+        at = max(rms(np.array([own[~shaped] / plausible for own in values.values()])), 1e-12)
         self._refined[name, law] = tuple(
             replace(
                 variant,
@@ -249,7 +224,6 @@ class CircleChannel:
                 tangents=tangents.shape[1],
                 parts=parts.shape[1],
                 slack_at=at / np.sqrt(np.mean(np.square(self.to_whole(variant).sum(axis=1)))),
-                log_weight=variant.log_weight + weight,
             )
             for variant in variants
         )
@@ -327,49 +301,35 @@ class CircleChannel:
             for name, every in found.items()
         )
 
-    def _on_a_grid(self, source: ErrorSource) -> tuple[Variant, ...]:
+    def _over(self, source: ErrorSource) -> SourceOverRuns:
         shared = [source.shared_by(motion) for motion in self.motions]
-        points = list(product(*(p.grid for p in source.parameters(self.machine) if p.grid)))
-        points = [point for point in points if source.shows(self.motions, point)] or points[:1]
-        found: list[Variant] = []
-        for point in points:
-            derivatives = [by_amplitudes(reading, source, self.machine, point) for reading in self.readings]
-            found += self._variants(source, derivatives, shared, point)
-        return tuple(replace(v, log_weight=v.log_weight - float(np.log(len(points)))) for v in found)
+        return SourceOverRuns(source, self.machine, self.motions, self.readings, shared, self.variables)
+
+    def _on_a_grid(self, over: SourceOverRuns) -> tuple[Variant, ...]:
+        points = list(product(*(p.grid for p in over.shapes)))
+        points = [point for point in points if over.source.shows(self.motions, point)] or points[:1]
+        weight = -float(np.log(len(points)))
+        forms = (self._variants(over, over.columns(point), point, weight) for point in points)
+        return tuple(chain.from_iterable(forms))
 
     def _variants(
-        self,
-        source: ErrorSource,
-        derivatives: Sequence[Floats],
-        shared: Sequence[str],
-        nonlinear: tuple[float, ...],
-    ) -> list[Variant]:
-        own_amplitudes, sets = amplitudes(source, self.machine), list(dict.fromkeys(shared))
-        count = len(own_amplitudes)
-        samples = np.zeros((self.runs[-1].stop, count * len(sets)))
-        for rows, derivative, own in zip(self.runs, derivatives, shared, strict=True):
-            place = count * sets.index(own)
-            samples[rows, place : place + count] = derivative
-        forms, columns = forms_of(own_amplitudes, len(sets)), self.columns.add(samples)
-        every, plausible = columns, np.tile([p.plausible for p in own_amplitudes], len(sets))
-        positive = np.tile([p.positive for p in own_amplitudes], len(sets))
-        if has_common(forms):
-            every = np.append(columns, self.columns.add(samples.sum(axis=1, keepdims=True)))
-            plausible, positive = np.append(plausible, plausible[0]), np.append(positive, positive[0])
-        return [
-            Variant(
-                every[list(places)],
-                plausible[list(places)],
-                nonlinear,
-                label=label,
-                law=source.law,
-                whole=columns if label else columns[:0],
-                log_weight=weight,
-                positive=tuple(positive[list(places)].tolist()),
-                form_uncertainty=source.form_uncertainty,
-            )
-            for places, weight, label in forms
-        ]
+        self, over: SourceOverRuns, samples: Floats, nonlinear: tuple[float, ...], log_weight: float
+    ) -> tuple[Variant, ...]:
+        """Return a source's forms, with columns of all groups' amplitudes, shape (n, p)."""
+        whole = columns = self.columns.add(samples)
+        if over.alike:
+            columns = np.append(whole, self.columns.add(samples.sum(axis=1, keepdims=True)))
+        every = Variant(
+            columns,
+            np.array([p.plausible for p in over.every]),
+            nonlinear,
+            law=over.source.law,
+            whole=whole,
+            log_weight=log_weight,
+            positive=tuple(p.positive for p in over.every),
+            form_uncertainty=over.source.form_uncertainty,
+        )
+        return parts_of(every, over.forms)
 
 
 def _spacing(parameter: Parameter, value: float) -> float:

@@ -14,7 +14,7 @@ from dbbstation.calibration.fit.calibrate import Calibration, calibrate, default
 from dbbstation.calibration.outliers.robust import MOST, calibrate_robust, in_place_after_all
 from dbbstation.calibration.outliers.stray_balls import set_free
 from dbbstation.diagnosis.channel import CircleChannel
-from dbbstation.diagnosis.parts import amplitudes, at_point
+from dbbstation.diagnosis.parts import at_point
 from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of, named_already
@@ -387,13 +387,12 @@ def _estimated(channel: CircleChannel, comparison: ModelComparison, hypothesis: 
         if not member.cause.named:
             found.append(None)
             continue
-        source = channel.source_of(member.name, member.variant)
-        grids = [p.grid for p in source.parameters(channel.machine) if p.grid]
+        over = channel.over[member.name, member.variant.law]
+        grids = [p.grid for p in over.shapes]
         whole = channel.to_whole(member.variant) @ own[: member.width]
         tangents = own[member.width :][: len(grids)] if len(member.variant.slack) else 0.0
         point = np.clip(np.array(member.variant.nonlinear) + tangents, [*map(min, grids)], [*map(max, grids)])
-        sizes = whole[: len(amplitudes(source, channel.machine))]
-        found.append(at_point(source, channel.machine, point, sizes))
+        found.append(at_point(over.source, channel.machine, point, whole[: len(over.amplitudes)]))
     return found
 
 
@@ -414,14 +413,13 @@ def _lay_out(
 ) -> None:
     others = _lawful(best, member.name)
     name, law = rival.name, rival.variant.law
-    sets = list(dict.fromkeys(channel.sources[name, law].shared_by(motion) for motion in channel.motions))
     for _ in range(BOUNDS.steps_of_rivals if rival.variant.nonlinear else 1):
         hypothesis = Hypothesis((*others, rival), 0.0)
         own = np.unique(all_columns(hypothesis.members))
         values = _estimated(channel, beside.comparison(target, own), hypothesis)[-1]
         if values is None or not values.any():
             return
-        channel.refine(name, law, dict.fromkeys(sets, values), fit)
+        channel.refine(name, law, dict.fromkeys(channel.over[name, law].shared, values), fit)
         if not rival.variant.nonlinear:
             return
         refined = next(c for c in channel.named if c.name == name)

@@ -7,13 +7,14 @@ departures [Kennedy and O'Hagan 2001, sec. 4].
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dbbstation.inference.forms import ALONG_SCREWS, DEGREE, modulated
+from dbbstation.inference.square_root import slices
 from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.travel import middle
@@ -21,7 +22,7 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Owner
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from dbbstation.calibration.layout import Layout
     from dbbstation.computing.arrays import Flags, Floats
@@ -96,11 +97,6 @@ def forms_of(amplitudes: Sequence[Parameter], sets: int) -> Choices:
     return tuple((own, -float(np.log(len(kinds) * len(kind))), label) for kind in kinds for label, own in kind)
 
 
-def has_common(forms: Choices) -> bool:
-    """Return whether all struts may share one amplitude."""
-    return any(label == ALIKE for _, _, label in forms)
-
-
 def variable_of(source: ErrorSource) -> str:
     """Return a named cause's variable; its own name without a single variable."""
     return SESSION_TIME if source.varies_with == "time" else source.varies_with or source.name
@@ -126,6 +122,86 @@ class Effects:
     values: Floats
     derivative: Floats
     known: Mapping[str, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class SourceOverRuns:
+    """A source over runs, some of which share its values.
+
+    Attributes:
+        shared: name of each run's values.
+        known: variables of each run; see `variables`.
+    """
+
+    source: ErrorSource
+    machine: Machine
+    motions: Sequence[Motion]
+    readings: Sequence[BarReading]
+    shared: Sequence[Any]
+    known: Sequence[Mapping[str, Floats]]
+
+    @cached_property
+    def groups(self) -> list[int]:
+        """Return each run's group of shared values."""
+        order = list(dict.fromkeys(self.shared))
+        return [order.index(name) for name in self.shared]
+
+    @property
+    def sets(self) -> int:
+        """Return the number of groups."""
+        return max(self.groups) + 1
+
+    @cached_property
+    def rows(self) -> list[slice]:
+        """Return the rows of each run."""
+        return slices(len(reading.length_mm) for reading in self.readings)
+
+    @cached_property
+    def shapes(self) -> list[Parameter]:
+        """Return the nonlinear parameters."""
+        return [p for p in self.source.parameters(self.machine) if p.grid]
+
+    @cached_property
+    def amplitudes(self) -> list[Parameter]:
+        """Return the amplitudes of one group."""
+        return amplitudes(self.source, self.machine)
+
+    @cached_property
+    def forms(self) -> Choices:
+        """Return the alternative forms; see `forms_of`."""
+        return forms_of(self.amplitudes, self.sets)
+
+    @cached_property
+    def alike(self) -> bool:
+        """Return whether all struts may share one amplitude, whose column is the sum of the others."""
+        return any(label == ALIKE for _, _, label in self.forms)
+
+    @property
+    def every(self) -> list[Parameter]:
+        """Return the amplitude of each column, the common one last."""
+        return self.amplitudes * self.sets + self.amplitudes[: int(self.alike)]
+
+    def by_group(self, derivatives: Iterable[Floats]) -> Floats:
+        """Return the derivatives of runs by the amplitudes of all groups, shape (n, p)."""
+        count = len(self.amplitudes)
+        found = np.zeros((self.rows[-1].stop, count * self.sets))
+        for rows, derivative, group in zip(self.rows, derivatives, self.groups, strict=True):
+            found[rows, count * group : count * (group + 1)] = derivative
+        return found
+
+    def columns(self, point: Sequence[float]) -> Floats:
+        """Return `by_group` at nonlinear parameters."""
+        shaped, values = is_shape(self.source, self.machine), at_point(self.source, self.machine, point)
+        return self.by_group(one.by_source(self.source, self.machine, values)[:, ~shaped] for one in self.readings)
+
+    def effects(self, values: Iterable[Floats]) -> list[Effects]:
+        """Return the effect of each run's values, shape (p,)."""
+        every = zip(self.motions, self.readings, values, self.known, strict=True)
+        return [Effects(m, r, own, r.by_source(self.source, self.machine, own), known) for m, r, own, known in every]
+
+    def slack(self, effects: Sequence[Effects]) -> tuple[Floats, Floats]:
+        """Return the inaccuracy of the formula, and what it leaves open, as columns over all runs."""
+        return discrepancy_of(self.source, self.machine, effects), left_open_of(self.source, self.machine, effects)
 
 
 def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:

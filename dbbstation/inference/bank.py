@@ -404,7 +404,7 @@ class Bank:
             own, np.full(len(own), plausible), slack=slack, slack_sd=moved, slack_at=LARGE, tangents=len(slack)
         )
         choices = self._of_blocks() if pattern.family is Family.BLOCKS else pattern.choices
-        return Cause(pattern.name, _parts(whole, choices), self._odds(pattern), named=pattern.family in NAMED)
+        return Cause(pattern.name, parts_of(whole, choices), self._odds(pattern), named=pattern.family in NAMED)
 
     def _of_blocks(self) -> Choices:
         half, names = float(np.log(0.5)), self.channel.names
@@ -428,7 +428,7 @@ def _whitened(kept: Flags, whitening: csr_array | None, rows: Floats) -> Floats:
     return own if whitening is None else whitening @ own
 
 
-def _parts(whole: Variant, choices: Choices) -> tuple[Variant, ...]:
+def parts_of(whole: Variant, choices: Choices) -> tuple[Variant, ...]:
     """Return each choice of a form's amplitudes as a form; without choices only the whole."""
     return tuple(
         replace(
@@ -437,7 +437,7 @@ def _parts(whole: Variant, choices: Choices) -> tuple[Variant, ...]:
             plausible=whole.plausible[list(part)],
             label=label,
             log_weight=whole.log_weight + weight,
-            positive=whole.positive[: len(part)],
+            positive=tuple(whole.positive[k] for k in part) if whole.positive else (),
         )
         for part, weight, label in choices
     ) or (whole,)
@@ -448,7 +448,7 @@ def _forms(
 ) -> tuple[Variant, ...]:
     every = columns if law.choices else columns[:0]
     whole = Variant(columns, plausible, point, whole=every, log_weight=log_weight, positive=law.positive)
-    return _parts(replace(whole, form_uncertainty=law.form_uncertainty), law.choices)
+    return parts_of(replace(whole, form_uncertainty=law.form_uncertainty), law.choices)
 
 
 def tangents_of(law: Law, point: Sequence[float], amplitudes: Floats, spacings: Sequence[float]) -> list[Floats]:

@@ -288,7 +288,7 @@ def _bend(table: LawRows, family: Family, variable: Variable, grows: float, memb
         members,
         (width, variable.unit, tuple(share * largest for share in WIDTHS[family])),
         choices=one_of([label for _, _, label in own]) if len(own) > 1 else (),
-        positive=(True,) if grows else (),
+        positive=(True,) * len(own) if grows else (),
     )
 
 

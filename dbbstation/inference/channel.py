@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.facts.value import Value
+    from dbbstation.inference.model_comparison import Variant
     from dbbstation.inference.patterns import Choices, Family, Pattern
     from dbbstation.inference.square_root import Solution
     from dbbstation.laws.contract import SourceForm
@@ -203,7 +204,7 @@ class Law:
             departure, shape (n, q), with standard deviation `form_uncertainty`. Default: the effect times smooth
             functions of `follows`.
         at: function from nonlinear parameters and amplitudes, shape (p,), to linearised columns; None if proportional.
-        choices: alternative forms: columns, log probability, label; `positive` then applies to each form's columns.
+        choices: alternative forms: columns, log probability, label.
         zero_from: reference value of the first variable; the effect is zero at this value minus the ratio of second to
             first amplitude. None without such a zero.
         reach: prior standard deviation of each amplitude's greatest effect, in the residual's unit; None to use
@@ -411,12 +412,12 @@ NEGATIVE_SIGMA = 3.0
 """Standard deviations below zero at which a non-negative parameter is impossible: one in 700 by chance."""
 
 
-def impossible(law: Law, values: Floats, variances: Floats, least: float = NEGATIVE_SIGMA) -> str:
-    """Return why amplitudes are impossible, else an empty text; arguments as of `impossibly_negative`."""
-    for k, positive in enumerate(law.positive):
+def impossible(law: Law, variant: Variant, values: Floats, covariance: Floats, least: float = NEGATIVE_SIGMA) -> str:
+    """Return why a form's amplitudes are impossible, else an empty text; arguments as of `impossibly_negative`."""
+    for k, (positive, name, unit) in enumerate(zip(variant.positive, law.parameters, law.units, strict=False)):
         value = float(values[k])
-        sigma = float(np.hypot(np.sqrt(variances[k]), law.form_uncertainty * value))
-        if positive and (why := impossibly_negative(law.parameters[k], value, sigma, law.units[k], least)):
+        sigma = float(np.hypot(np.sqrt(covariance[k, k]), law.form_uncertainty * value))
+        if positive and (why := impossibly_negative(name, value, sigma, unit, least)):
             return why
     return ""
 

@@ -160,7 +160,7 @@ def _is_possible(settled: Settled, member: Member, others: Sequence[Member]) -> 
     if not any(member.variant.positive):
         return True
     _, values, covariance = settled.comparison.estimated([member, *others])[0]
-    return not impossible(settled.bank.laws[member.name], values, np.diag(covariance))
+    return not impossible(settled.bank.laws[member.name], member.variant, values, covariance)
 
 
 def _is_worse(best: Floats, other: Floats, parts: Sequence[Flags] | None) -> bool:

@@ -469,7 +469,7 @@ class CauseJudge:
         # An insignificantly negative value may be zero.
         signed = [name for name, sign in zip(law.parameters, law.positive, strict=False) if sign and name in own]
         every |= {name: max(every[name], 0.0) for name in signed}
-        return impossible(law, values, np.diag(covariance)) or impossible_beside(law, own, every)
+        return impossible(law, shown.variant, values, covariance) or impossible_beside(law, own, every)
 
     @cached_property
     def _of_laws(self) -> dict[str, float]:

@@ -501,7 +501,7 @@ def _impossible(settled: Settled) -> dict[str, str]:
         effect = settled.bank.samples(member.variant.columns) @ values[:width]
         # What is there by one amplitude is not there by less than nothing: its shape would be moved until it is another law.
         least = 0.0 if width == 1 else NEGATIVE_SIGMA
-        why = impossible(laws[name], values[:width], np.diag(covariance)[:width], least)
+        why = impossible(laws[name], member.variant, values, covariance, least)
         if why := why or beyond_reach(laws[name], float(np.std(effect))):
             found[name] = why
         own[name] = values_of_law(laws[name], member, values, covariance, laws[name].form_uncertainty)

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.parts import ALIKE, amplitudes, forms_of, has_common
+from dbbstation.diagnosis.parts import ALIKE, amplitudes, forms_of
 from dbbstation.sources.causes.backlash import Backlash
 from dbbstation.sources.causes.ball_form import BallForm
 
@@ -28,6 +28,5 @@ def test_a_figure_has_forms_of_one_and_two_orders(reference, sets):
 def test_struts_act_each_alone_or_all_alike(reference):
     forms = forms_of(amplitudes(Backlash(), reference), 1)
     assert sorted(len(places) for places, _, _ in forms) == [1] * 7 + [6]
-    assert has_common(forms)
     assert [places for places, _, label in forms if label == ALIKE] == [(6,)]
     assert sum(np.exp(weight) for _, weight, _ in forms) == pytest.approx(1.0)

@@ -11,18 +11,7 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES
 from dbbstation.diagnosis.compare.set_up import base_of, jig_laws, set_up_laws
-from dbbstation.diagnosis.parts import (
-    ALIKE,
-    Effects,
-    amplitudes,
-    at_point,
-    by_amplitudes,
-    discrepancy_of,
-    forms_of,
-    has_common,
-    left_open_of,
-    variable_of,
-)
+from dbbstation.diagnosis.parts import ALIKE, SourceOverRuns, at_point, variable_of
 from dbbstation.diagnosis.shapes import EVERY, READING, SIGNED, UNITS, ranges, samples_of, shapes
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.channel import NAMED_ODDS, Channel, Kind, Law, Variable
@@ -35,10 +24,9 @@ from dbbstation.sources.registry import sources_named
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.computing.arrays import Floats, Integers
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.compare.pairs import Sides
     from dbbstation.diagnosis.shapes import Samples, Shape
-    from dbbstation.inference.patterns import Choices
     from dbbstation.sources.contract import ErrorSource, Parameter
 
 
@@ -72,19 +60,24 @@ class Change:
     sides: Sides
     share: float = 1.0
 
+    @cached_property
+    def _over(self) -> list[SourceOverRuns]:
+        """Return the source over the runs of A and B, which share its values if both sessions' runs do."""
+        sides, source = self.sides, self.source
+        shared = [(source.shared_by(one), source.shared_by(other)) for one, other in zip(*sides.motions, strict=True)]
+        every = zip(sides.motions, sides.readings, sides.variables, strict=True)
+        return [SourceOverRuns(source, sides.machine, m, r, shared, known) for m, r, known in every]
+
     def _name(self) -> str:
         usual = self.source.law == self.source.varies_with != "temperature"
         return self.source.name if usual else f"{self.source.name} by {self.source.law}"
 
     def law(self, log_odds: float) -> Law:
         """Return the source as a law, with forms by part and combination."""
-        shapes, whens = [p for p in self._parameters if p.grid], self._whens
-        own = [
-            (p, f"{p.name} ({number + 1})" if self._sets > 1 else p.name)
-            for number in range(self._sets)
-            for p in self._amplitudes
-        ]
-        own += [(self._amplitudes[0], ALIKE)] if self._alike else []
+        over, whens = self._over[1], self._whens
+        shapes, sets, count = over.shapes, over.sets, len(over.amplitudes)
+        named = [f"{p.name} ({k // count + 1})" if sets > 1 else p.name for k, p in enumerate(over.amplitudes * sets)]
+        own = list(zip(over.every, [*named, ALIKE], strict=False))
         every = [(p, f"{name}, {when.label}" if when.label else name) for when in whens for p, name in own]
         choices = tuple(
             (
@@ -93,7 +86,7 @@ class Change:
                 " ".join(text for text in (label, when.label) if text),
             )
             for number, when in enumerate(whens)
-            for places, weight, label in self._forms
+            for places, weight, label in over.forms
         )
         return Law(
             name=self._name(),
@@ -121,16 +114,16 @@ class Change:
             own = when.of_b * of_b
             if of_a is not None and when.of_a:
                 own = own + when.of_a * of_a
-            found += [own, own.sum(axis=1, keepdims=True)] if self._alike else [own]
+            found += [own, own.sum(axis=1, keepdims=True)] if self._over[1].alike else [own]
         return np.hstack(found)
 
     def _at(self, point: tuple[float, ...], amplitudes: Floats) -> Floats:
         found = self.columns(point)
-        width = len(amplitudes) // len(self._whens)
+        width, over = len(amplitudes) // len(self._whens), self._over[1]
         for k in np.flatnonzero(amplitudes).tolist():
             when, own = self._whens[k // width], k % width
-            values = np.zeros(len(self._amplitudes) * self._sets)
-            values[slice(None) if self._alike and own == width - 1 else own] = amplitudes[k]
+            values = np.zeros(len(over.amplitudes) * over.sets)
+            values[slice(None) if over.alike and own == width - 1 else own] = amplitudes[k]
             effect = when.of_b * self._effect(1, point, values)
             if when.of_a:
                 effect = effect + when.of_a * self._effect(0, point, values)
@@ -138,48 +131,25 @@ class Change:
         return found
 
     def _effect(self, side: int, point: tuple[float, ...], amplitudes: Floats) -> Floats:
-        pieces, sides = [], self.sides
-        for group, motion, reading in zip(self._groups, sides.motions[side], sides.readings[side], strict=True):
-            values = self._values(point, amplitudes, group)
-            effect = self.source.effect(motion, sides.machine, values)
+        pieces, over = [], self._over[side]
+        for motion, reading, values in zip(over.motions, over.readings, self._values(point, amplitudes), strict=True):
+            effect = self.source.effect(motion, over.machine, values)
             pieces.append(reading.by_parameters(_as_derivative(effect))[:, 0])
-        return sides.averaged(side, pieces)
+        return self.sides.averaged(side, pieces)
 
     @property
     def _proportional(self) -> bool:
         return isinstance(self.source, LinearSource) or Need.PATH not in self.source.needs
 
-    def _values(self, point: tuple[float, ...], sizes: Floats, group: int) -> Floats:
-        own = np.split(sizes, self._sets)[group]
-        return at_point(self.source, self.sides.machine, point, own)
-
-    @cached_property
-    def _parameters(self) -> tuple[Parameter, ...]:
-        return self.source.parameters(self.sides.machine)
-
-    @cached_property
-    def _amplitudes(self) -> list[Parameter]:
-        return amplitudes(self.source, self.sides.machine)
+    def _values(self, point: tuple[float, ...], sizes: Floats) -> list[Floats]:
+        """Return the source's values in each run, shape (p,)."""
+        over = self._over[1]
+        of_groups = np.split(sizes, over.sets)
+        return [at_point(self.source, over.machine, point, of_groups[group]) for group in over.groups]
 
     @cached_property
     def _middle(self) -> tuple[float, ...]:
-        return tuple(p.grid[len(p.grid) // 2] for p in self._parameters if p.grid)
-
-    @cached_property
-    def _groups(self) -> Integers:
-        return self.sides.groups(self.source)
-
-    @property
-    def _sets(self) -> int:
-        return int(self._groups.max()) + 1
-
-    @cached_property
-    def _forms(self) -> Choices:
-        return forms_of(self._amplitudes, self._sets)
-
-    @property
-    def _alike(self) -> bool:
-        return has_common(self._forms)
+        return tuple(p.grid[len(p.grid) // 2] for p in self._over[1].shapes)
 
     @cached_property
     def _whens(self) -> tuple[When, ...]:
@@ -194,19 +164,17 @@ class Change:
         return shown or values[:1]
 
     def _of(self, side: int, point: tuple[float, ...]) -> Floats:
-        count, pieces = len(self._amplitudes), []
-        for group, reading in zip(self._groups, self.sides.readings[side], strict=True):
-            derivative = by_amplitudes(reading, self.source, self.sides.machine, point)
-            own = np.zeros((len(derivative), count * self._sets))
-            own[:, count * group : count * (group + 1)] = derivative
-            pieces.append(own)
-        return self.sides.averaged(side, pieces)
+        return self._averaged(side, self._over[side].columns(point))
+
+    def _averaged(self, side: int, rows: Floats) -> Floats:
+        return self.sides.averaged(side, [rows[own] for own in self._over[side].rows])
 
     def _discrepancy(self, effect: Floats, point: tuple[float, ...], amplitudes: Floats) -> Floats:
-        count = len(self._amplitudes) * self._sets
+        over = self._over[1]
+        count = len(over.amplitudes) * over.sets
         total = [np.zeros(count), np.zeros(count)]
         for when, own in zip(self._whens, np.split(amplitudes, len(self._whens)), strict=True):
-            values = own[:count] + (own[count] if self._alike else 0.0)
+            values = own[:count] + (own[count] if over.alike else 0.0)
             total[0] += when.of_a * values
             total[1] += when.of_b * values
         found = [np.zeros((len(effect), 0))]
@@ -214,14 +182,8 @@ class Change:
         return np.hstack(found)
 
     def _slack(self, side: int, point: tuple[float, ...], amplitudes: Floats) -> Floats:
-        runs, sides = [], self.sides
-        every = zip(self._groups, sides.motions[side], sides.readings[side], sides.variables[side], strict=True)
-        for group, motion, reading, known in every:
-            values = self._values(point, amplitudes, group)
-            derivative = reading.by_source(self.source, sides.machine, values)
-            runs.append(Effects(motion, reading, values, derivative, known))
-        found = np.hstack([of(self.source, sides.machine, runs) for of in (discrepancy_of, left_open_of)])
-        return sides.averaged(side, np.split(found, np.cumsum([len(run.derivative) for run in runs])[:-1]))
+        over = self._over[side]
+        return self._averaged(side, np.hstack(over.slack(over.effects(self._values(point, amplitudes)))))
 
 
 def _as_derivative(effect: Effect) -> Effect:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation
     from dbbstation.plan.plan import Circle, Direction
-    from dbbstation.sources.contract import ErrorSource, Motion
+    from dbbstation.sources.contract import Motion
     from dbbstation.trace.recording import RawCircle
 
 
@@ -294,12 +294,6 @@ class Sides:
             values[order] = rows[block]
             found.append(values)
         return found
-
-    def groups(self, source: ErrorSource) -> Integers:
-        """Return each pair's group of shared values in both sessions, shape (r,)."""
-        names = [(source.shared_by(one), source.shared_by(other)) for one, other in zip(*self.motions, strict=True)]
-        order = list(dict.fromkeys(names))
-        return np.array([order.index(name) for name in names], dtype=np.int64)
 
 
 def _thinned(run: Observation, pair: Pair) -> Observation:

@@ -63,7 +63,7 @@ def test_a_lead_and_gravity_are_named_though_both_act_over_the_length(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("rivals", "tests", "rate_hz"),
-    [(RIVALS, TESTS, 5.0), pytest.param(None, TESTS, RATE_HZ, marks=pytest.mark.nightly)],
+    [(RIVALS, TESTS, 3.0), pytest.param(None, TESTS, RATE_HZ, marks=pytest.mark.nightly)],
     ids=["few", "all"],
 )
 def test_three_causes_at_once_are_all_named(tmp_path, monkeypatch, rivals, tests, rate_hz):

@@ -58,6 +58,12 @@ def channel(data: Table, laws: tuple[Law, ...] = (), blocks: int = 2) -> Channel
     )
 
 
+def of_time(data: Table, blocks: int = 2) -> Channel:
+    """The channel over time and one place, for what happens in time."""
+    whole = channel(data, blocks=blocks)
+    return replace(whole, variables=whole.variables[:2])
+
+
 @pytest.fixture(autouse=True)
 def fewer_rows(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """A third of the rows; the nightly tests have all."""
@@ -135,7 +141,7 @@ def test_an_effect_is_found_in_correlated_noise_with_an_honest_size(seeds: int) 
 @pytest.mark.parametrize("correlation", [pytest.param(0.0, marks=pytest.mark.nightly), 0.9])
 def test_a_pulse_is_found_without_being_told_when(correlation: float) -> None:
     data = table(8, lambda d: 0.4 * ((d.t >= 20.0) & (d.t < 23.0)), correlation=correlation)
-    (found,) = there(read_by_levels(settle(channel(data)))).values()
+    (found,) = there(read_by_levels(settle(of_time(data)))).values()
     (rows,) = found.rows
     # A row in or out of it costs little where its noise is a quarter of the pulse.
     assert abs(rows[0] - 400) <= 2
@@ -150,7 +156,7 @@ def test_several_pulses_are_found() -> None:
         row = np.arange(len(d.t))
         return 0.3 * np.sum([(row >= k) & (row < k + 40) for k in starts], axis=0)
 
-    found = there(read_by_levels(settle(channel(table(9, pulses, rows=1500))))).values()
+    found = there(read_by_levels(settle(of_time(table(9, pulses, rows=1500))))).values()
     assert {finding.form for finding in found} == {"pulses"}
     rows = sorted(stretch for finding in found for stretch in finding.rows)
     assert len(rows) == len(starts)

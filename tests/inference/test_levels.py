@@ -274,8 +274,8 @@ def test_no_law_is_named_against_held_out_rows(both, parts, named):
 
 
 def test_time_and_single_rows_are_the_time():
-    data = table(4, rows=600)
-    inside = (np.arange(600) >= 200) & (np.arange(600) < 300)
+    data = table(4, rows=400)
+    inside = (np.arange(400) >= 200) & (np.arange(400) < 300)
     whole = channel(data, blocks=1)
     settled = settle(replace(whole, residual=whole.residual + 0.4 * inside))
     (one,) = levels_of(settled, left_over(settled), None).follows

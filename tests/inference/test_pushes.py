@@ -12,7 +12,7 @@ from dbbstation.inference.levels import Verdict, distinct_sizes, most_of_one_siz
 from dbbstation.inference.settle import settle
 from tests.inference.reading import read_by_levels
 from tests.inference.tables import table
-from tests.inference.test_channel import channel
+from tests.inference.test_channel import channel, of_time
 
 
 def sizes(*values, sigma=0.1):
@@ -55,7 +55,7 @@ def test_rounding_of_a_slow_value_is_no_event():
 @pytest.mark.parametrize("equal", [True, False])
 def test_a_dozen_pulses_happened_only_where_they_are_of_one_size(equal):
     """Twelve stretches of 15 rows in white noise of 0.1: either all of 1, or each of a size of its own."""
-    whole = channel(table(4, rows=360), blocks=1)
+    whole = of_time(table(4, rows=360), blocks=1)
     heights = np.ones(12) if equal else np.random.default_rng(3).permutation(np.linspace(0.7, 4.0, 12))
     pulses = np.repeat(heights, 30) * (np.arange(360) % 30 >= 15)
     settled = settle(replace(whole, residual=whole.residual + pulses), thorough=False)

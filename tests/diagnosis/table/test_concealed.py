@@ -10,9 +10,9 @@ pytestmark = pytest.mark.usefixtures("few_parts")
 
 @pytest.fixture(autouse=True)
 def fewer_rows(request, monkeypatch):
-    """Half the rows of the study; the nightly tests have all, and so has creep, which half of them leave ambiguous."""
+    """Half the rows of the study, or a third; the nightly tests have all, and so has creep, which half of them leave ambiguous."""
     if "not nightly" in request.config.option.markexpr and "creep" not in request.node.name:
-        monkeypatch.setattr(concealed, "ROWS", 300)
+        monkeypatch.setattr(concealed, "ROWS", 200 if "expansion" in request.node.name else 300)
 
 
 @pytest.mark.parametrize(("case", "size"), [("payload", 2.0), ("expansion", 5.0)])

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.usefixtures("few_parts")
 
 ASKED = TableOptions("measured_mm", "simulated_mm")
+OF_TIME = TableOptions("measured_mm", "simulated_mm", {"t_s": None, "place_mm": None})
+"""Of what happens in time: the forms over other variables are searched in nightly tests only."""
 
 
 @pytest.fixture(autouse=True, params=[5.0, pytest.param(20.0, marks=pytest.mark.nightly)], ids=["5 Hz", "20 Hz"])
@@ -117,9 +119,10 @@ def test_what_is_measured_late_has_a_delay_that_is_positive(rng):
     assert finding.values["delay"].value == pytest.approx(0.03, rel=0.05)
 
 
-def test_a_step_and_a_pulse_are_placed_in_time(tmp_path, monkeypatch):
+def test_a_step_and_a_pulse_are_placed_in_time(tmp_path, monkeypatch, rate_hz):
     monkeypatch.setattr(plant, "RATE_HZ", 10.0)  # edges to a third of a second
-    found = found_in(tmp_path, Truth(step_um=6.0, pulse_um=12.0))
+    asked = OF_TIME if rate_hz == 5.0 else ASKED
+    found = found_in(tmp_path, Truth(step_um=6.0, pulse_um=12.0), asked=asked)
     stretches = sorted(rows for finding in found.there for rows in finding.rows)
     times = found.table.clock.values
     edges = np.array([[times[first], times[last]] for first, last in stretches]).ravel()
@@ -136,8 +139,9 @@ def test_play_and_temperature_together(tmp_path):
     assert found.cancelling is None
 
 
-def test_two_files_are_two_blocks_and_an_effect_of_one_is_placed_there(tmp_path):
-    found = found_in(tmp_path, Truth(), Truth(pulse_um=15.0))
+def test_two_files_are_two_blocks_and_an_effect_of_one_is_placed_there(tmp_path, rate_hz):
+    asked = OF_TIME if rate_hz == 5.0 else ASKED
+    found = found_in(tmp_path, Truth(), Truth(pulse_um=15.0), asked=asked)
     (finding,) = found.there
     first, second = finding.blocks.values()
     assert second > 5.0 * first

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import chdtrc, chdtri, logsumexp
 
 from dbbstation.computing.arrays import median_of, place_of_largest
@@ -94,6 +93,8 @@ def expected_beside(both: Together | None) -> Expected | None:
 
 def _tail(weights: Floats, covariances_um2: Floats) -> float:
     """Return the factor on the mean covariance that accounts for the longer tails of a mixture of sizes."""
+    from scipy.optimize import brentq  # noqa: PLC0415 - takes a fifth of a second; only judging by a model needs it
+
     # A sound circle exceeds the scaled ellipsoid with probability SHARE. The mixed covariances are assumed to be
     # proportional.
     sizes = np.trace(covariances_um2, axis1=1, axis2=2)

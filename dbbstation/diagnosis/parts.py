@@ -201,13 +201,13 @@ class SourceOverRuns:
 
     def slack(self, effects: Sequence[Effects]) -> tuple[Floats, Floats]:
         """Return the inaccuracy of the formula, and what it leaves open, as columns over all runs."""
+        if self.source.form_uncertainty == 0.0:
+            return np.zeros((self.rows[-1].stop, 0)), np.zeros((self.rows[-1].stop, 0))
         return discrepancy_of(self.source, self.machine, effects), left_open_of(self.source, self.machine, effects)
 
 
 def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
     """Return a source's slack columns over all runs, shape (n, q)."""
-    if source.form_uncertainty == 0.0:
-        return np.zeros((sum(len(run.derivative) for run in runs), 0))
     amplitude = ~is_shape(source, machine)
     effects: list[Floats] = []
     along: list[list[Floats]] = []
@@ -249,8 +249,6 @@ def seen_of(columns: Floats, sd: float, least: float) -> Floats:
 
 def left_open_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
     """Return the source's `left_open` changes as columns, shape (n, q), scaled to one standard deviation of the formula's inaccuracy."""
-    if source.form_uncertainty == 0.0:
-        return np.zeros((sum(len(run.derivative) for run in runs), 0))
     changes = [
         run.reading.by_parameters(
             run.motion.seen(source, partial(source.left_open, machine=machine, values=run.values), 1)

@@ -1,4 +1,4 @@
-"""Curves of unmodelled effects over variables, with few amplitudes; splines, powers, and inaccurate formulas.
+"""Curves of unmodelled effects over variables, with few amplitudes; splines, and inaccurate formulas.
 
 A form computes its columns and chooses the points to print. Smooth modulations represent the inaccuracy of a formula
 [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
@@ -217,12 +217,13 @@ class SignForm(Form):
 
 @dataclass(frozen=True, eq=False)
 class Proportional(Form):
-    """Proportional to the variable; amplitude per `unit`."""
+    """Proportional to the variable less `about`; amplitude per `unit`."""
 
     unit: float
+    about: float = 0.0
 
     def columns(self, values: Floats) -> Floats:
-        return (values / self.unit)[..., None]
+        return ((values - self.about) / self.unit)[..., None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -370,18 +371,6 @@ class Spline(Form):
         share = np.clip((np.asarray(values, dtype=np.float64) - self.low) / (self.high - self.low), 0.0, 1.0)
         flat = BSpline.design_matrix(share.ravel(), knots, DEGREE).toarray()
         return flat.reshape(*share.shape, self.functions)[..., : self.count]
-
-
-@dataclass(frozen=True, eq=False)
-class Power(Form):
-    """A power of the variable scaled to -1..1 (odd) or 0..1 (even)."""
-
-    low: float
-    high: float
-
-    def columns(self, values: Floats) -> Floats:
-        middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
-        return ((values - middle) / half)[..., None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from dbbstation.inference.channel import TRAVELS, Kind
-from dbbstation.inference.forms import Form, Power, SignForm, Spline, Walk, Wave
+from dbbstation.inference.forms import Form, Proportional, SignForm, Spline, Walk, Wave
 from dbbstation.inference.triangle import products_of_rows
 from dbbstation.laws.play import within
 
@@ -216,7 +216,7 @@ def covers_turns(variable: Variable) -> bool:
 
 def _over(variable: Variable) -> list[Pattern]:
     unit = f"/{variable.unit}" if variable.unit else f" per unit of {variable.name}"
-    straight = Power(variable.low, variable.high)
+    straight = Proportional(variable.half_range, 0.5 * (variable.low + variable.high))
     family = Family.DRIFT if variable.kind is Kind.TIME else Family.LINEAR
     found = [Pattern(family, (variable,), straight.columns(variable.values), straight, (unit,), (variable.half_range,))]
     if covers_turns(variable):

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 from textual.binding import Binding
 from textual.content import Content
-from textual.widgets import Footer
 
 from dbbstation.quality.answer import Advice
 from dbbstation.station.states import RECORDING, State
 from dbbstation.tui.board_screen import RunScreen
+from dbbstation.tui.footer import KeyFooter
 from dbbstation.tui.now_line import NowLine, TitleLine
 from dbbstation.tui.panel import Panel, lines
 from dbbstation.tui.reading_panel import Age
@@ -164,4 +164,4 @@ class LargeScreen(RunScreen):
         yield TitleLine(self._show.plan, id="large-title")
         yield NowLine(id="large-now")
         yield LargeFigures(clock=self._clock, id="large-figures")
-        yield Footer(show_command_palette=False)
+        yield KeyFooter()

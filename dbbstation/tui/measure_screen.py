@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 from textual.containers import Horizontal, Vertical
 from textual.content import Content
-from textual.widgets import Footer
 
 from dbbstation.service.board import RunDecision
 from dbbstation.service.live_trace import View
 from dbbstation.station.states import VERDICT, State
 from dbbstation.tui.board_screen import RunScreen
+from dbbstation.tui.footer import KeyFooter
 from dbbstation.tui.messages_screen import MessageLines
 from dbbstation.tui.now_line import NowLine, ProgressLine, TitleLine
 from dbbstation.tui.panel import Panel, lines
@@ -101,7 +101,7 @@ class MeasureScreen(RunScreen):
                 yield RunList(id="runs")
         yield ProgressLine(id="progress")
         yield MessageLines(id="messages")
-        yield Footer(show_command_palette=False)
+        yield KeyFooter()
 
     def draw(self) -> None:
         super().draw()

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 from textual.containers import Vertical, VerticalScroll
 from textual.content import Content
-from textual.widgets import Footer, Static
+from textual.widgets import Static
 
 from dbbstation.service.choice import Choice
 from dbbstation.station.states import State
 from dbbstation.tui import texts
 from dbbstation.tui.board_screen import RunScreen
+from dbbstation.tui.footer import KeyFooter
 from dbbstation.tui.large_screen import LargeFigures, block_rows, largest
 from dbbstation.tui.now_line import OperatorNowLine, ProgressLine, TitleLine, banner
 from dbbstation.tui.panel import lines
@@ -168,7 +169,7 @@ class OperateScreen(RunScreen):
             yield from set_up(self._show.bores, self._clock)
         yield LargeFigures(clock=self._clock, id="circle-view")
         yield ProgressLine(id="progress")
-        yield Footer(show_command_palette=False)
+        yield KeyFooter()
 
     def draw(self) -> None:
         self.set_class(self.desk.board.state in {None, State.BETWEEN, State.ANNOUNCED, State.PAUSED}, "-set-up")
@@ -198,7 +199,7 @@ class AnswerScreen(ExplainedScreen):
         yield Static(Content("The circles are held against the limits …"), id="answer-word")
         with VerticalScroll(id="answer-why", can_focus=False):
             yield Static("", id="answer-text", markup=False)
-        yield Footer(show_command_palette=False)
+        yield KeyFooter()
 
     def on_unmount(self) -> None:
         self._answer.close()

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 from textual.binding import Binding
 from textual.containers import Horizontal
-from textual.widgets import Footer
 
 from dbbstation.quality.answer import Advice
 from dbbstation.service.board import RunDecision
 from dbbstation.station.commands import GoTo, Judge
 from dbbstation.station.states import State
 from dbbstation.tui.board_screen import BoardScreen
+from dbbstation.tui.footer import KeyFooter
 from dbbstation.tui.now_line import TitleLine
 from dbbstation.tui.overview_panels import ChosenRun, ChosenTest, LeftLine, PlateMap, TestList
 from dbbstation.tui.questions import ReasonQuestion
@@ -65,7 +65,7 @@ class OverviewScreen(BoardScreen):
             yield PlateMap(self._show, self.choice)
             yield TestList(self.choice)
         yield ChosenRun(self._show, self.choice)
-        yield Footer(show_command_palette=False)
+        yield KeyFooter()
 
     def keys(self) -> object:
         run = self._run()

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from textual.containers import VerticalScroll
 from textual.content import Content
 from textual.screen import Screen
-from textual.widgets import Footer, OptionList, Static
+from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
 from dbbstation.service.session_notes import shop_degc
 from dbbstation.tui import texts
+from dbbstation.tui.footer import KeyFooter
 from dbbstation.tui.help_screen import HELP
 from dbbstation.tui.now_line import banner
 
@@ -72,7 +73,7 @@ class RowScreen(ExplainedScreen):
         yield OptionList(id="rows")
         with VerticalScroll(id="row-about", can_focus=False):
             yield Static("", id="row-text", markup=False)
-        yield Footer(show_command_palette=False)
+        yield KeyFooter()
 
     def say(self, text: str, *, wrong: bool = False) -> None:
         if not self.stands:

@@ -127,7 +127,7 @@ class Sums:
         Args:
             extent: of the variable.
         """
-        middle, half = 0.5 * (self.at.max() + self.at.min()), 0.5 * float(np.ptp(self.at))
+        middle, half = 0.5 * (self.at.max() + self.at.min()), max(0.5 * float(np.ptp(self.at)), 1e-300)
         points = chebpts1(POINTS_OF_SLOW)
         between = chebvander((self.at - middle) / half, len(points) - 1) @ np.linalg.inv(
             chebvander(points, len(points) - 1)

@@ -372,11 +372,16 @@ def _looked_about(
     starts: list[tuple[Member, ...]] = []
     if first and how.in_time and how.thorough:
         # Stretches of time can imitate effects with memory, and curves over time can imitate sudden effects. Separate
-        # starts therefore include effects over variables, and sudden effects with laws only.
-        begun = grown(bank.beside().comparison(bank.target), bank.causes)
+        # starts therefore include effects over variables, and sudden effects with laws only. Several laws together can
+        # imitate a sudden effect beside one of them, so another start has the strongest law alone.
+        comparison = bank.beside().comparison(bank.target)
+        begun = grown(comparison, bank.causes)
         starts.append(_looked(bank, begun, how, in_time=False))
         laws = tuple(member for member in begun if member.name in bank.laws)
         starts.append(_looked(bank, laws, how) if laws else ())
+        if len(laws) > 1:
+            alone = comparison.scan((), [cause for cause in bank.causes if cause.name in bank.laws])
+            starts.append(_looked(bank, (alone.best[int(alone.log_odds.argmax())],), how))
     best = _looked(bank, best, how, in_time=how.in_time)
     return best, starts
 

@@ -13,7 +13,7 @@ Item = TypeVar("Item")
 
 
 def uncounted(_done: int, _of: int) -> None:
-    """Take the progress of work that nobody follows."""
+    """Ignore the progress."""
 
 
 def counting(items: Collection[Item], tell: Counted) -> Iterator[Item]:
